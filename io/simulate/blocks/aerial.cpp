@@ -1,5 +1,9 @@
 // Simulates an aerial block: flight lines to the east and west over smooth terrain, with nadir images whose long side
 // is across the line.
+//
+// With the height H above mean terrain, the focal length f and an image of w x h pixels, the footprint is w H/f across
+// and h H/f along the line. Successive images are (1 - forward_overlap) h H/f apart, lines (1 - side_overlap) w H/f.
+// The axes of the block have their origin in its middle; z = 0 is the mean terrain.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -16,6 +20,8 @@ class AerialScene : public Scene {
  public:
   AerialScene(const SimulationOptions& options, const Intrinsics& intrinsics)
       : options_(options), intrinsics_(intrinsics), terrain_(options.seed, options.terrain_relief_m, options.height_m) {
+    // Half of the diagonal of the footprint on the deepest terrain, with a margin for tilts, distortion and deviations
+    // from the nominal place.
     const double half_diagonal = 0.5 * std::hypot(options.image_width, options.image_height) / options.focal_px;
     const double deepest = options.height_m + options.terrain_relief_m / 2;
     range_m_ = 1.15 * deepest * half_diagonal + 0.1 * options.height_m;
@@ -27,8 +33,10 @@ class AerialScene : public Scene {
     const auto ray = viewing_ray(intrinsics_, pixel);
     if (!ray) return std::nullopt;
     const Eigen::Vector3d direction = frame.rotation.conjugate() * *ray;
+    // A ray almost along the horizon may miss the terrain.
     if (direction.z() > -0.1) return std::nullopt;
     Eigen::Vector3d point(frame.centre.x(), frame.centre.y(), 0);
+    // The error shrinks in each iteration by the slope of the terrain times the tangent of the nadir angle.
     for (int i = 0; i < 30; ++i) {
       const double z = terrain_.height(point.x(), point.y());
       point = frame.centre + direction * ((z - frame.centre.z()) / direction.z());
@@ -67,6 +75,7 @@ Layout make_aerial_layout(const SimulationOptions& options) {
   const double spacing = (1 - options.side_overlap) * options.height_m * options.image_width / options.focal_px;
   const double n = static_cast<double>(options.frames);
   // The block is as square on the ground as possible.
+  // n / L images per line make the lines (n / L) base long. This equals the width L spacing for L^2 = n base / spacing.
   const auto lines = std::max<std::int64_t>(1, std::llround(std::sqrt(n * base / spacing)));
   const std::int64_t per_line = (options.frames + lines - 1) / lines;
   for (std::int64_t f = 0; f < options.frames; ++f) {
@@ -78,10 +87,12 @@ Layout make_aerial_layout(const SimulationOptions& options) {
     Pose pose;
     pose.centre = {(along - 0.5 * static_cast<double>(per_line - 1)) * base,
                    (static_cast<double>(line) - 0.5 * static_cast<double>(lines - 1)) * spacing, options.height_m};
+    // Normal deviations are cut off, so that a rare large one cannot open a gap between the lines.
     pose.centre += Eigen::Vector3d(0.03 * base, 0.02 * spacing, 0.01 * options.height_m)
                        .cwiseProduct(random.normal3().cwiseMin(2).cwiseMax(-2));
     const Eigen::Vector3d tilt = random.normal3().cwiseMin(2.5).cwiseMax(-2.5);
     pose.rotation = nadir_rotation(heading - std::numbers::pi / 2);
+    // Turns about the axes of the ground: two tilts, then the heading.
     pose.rotation = rotation_update(pose.rotation, kDegree * Eigen::Vector3d(1.0, 1.0, 1.5).cwiseProduct(tilt));
     add_simulated_frame(layout, pose, line, 2.0 * static_cast<double>(f));
   }

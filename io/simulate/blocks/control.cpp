@@ -12,6 +12,7 @@ ControlPoint measure_control(const SimulationOptions& options, const Eigen::Vect
   ControlPoint point;
   point.position = truth + options.control_sigma_m * random.normal3();
   point.sigma.setConstant(options.control_sigma_m);
+  // A stated sigma must be positive, also if there is no noise.
   const double sigma_px = options.image_noise_px > 0 ? options.image_noise_px : 0.1;
   for (const Sighting& s : seen) {
     const double x = random.normal(), y = random.normal();
@@ -20,8 +21,11 @@ ControlPoint measure_control(const SimulationOptions& options, const Eigen::Vect
   return point;
 }
 
-// The places come from an additive recurrence over the extent of the block (Roberts' R2 sequence). Each is then moved
-// into the view of the nearest frame. Roles alternate in proportion to their numbers.
+// The places come from an additive recurrence over the extent of the block (Roberts' R2 sequence): the shares are the
+// fractions of 0.5 + i / g and 0.5 + i / g^2, where g is the plastic number, the root of g^3 = g + 1. Every beginning
+// of the sequence covers the extent evenly. Each place is then moved into the view of the nearest frame. Roles
+// alternate in proportion to their numbers: point i is a control point while fewer than control_points (i + 1) / total
+// were made.
 void simulate_control(const SimulationOptions& options, const Observer& observer, Layout& layout) {
   const int total = options.control_points + options.check_points;
   if (total == 0) return;
@@ -41,6 +45,7 @@ void simulate_control(const SimulationOptions& options, const Observer& observer
                                           [&](const Pose& a, const Pose& b) { return distance(a) < distance(b); });
     Eigen::Vector3d truth = Eigen::Vector3d::Zero();
     std::vector<Sighting> seen;
+    // Three images are wanted. Two images of the last try are accepted.
     for (int tries = 0; tries < 1000 && seen.size() < 3; ++tries) {
       const auto surface = layout.scene->sample(*nearest, random);
       if (!surface) continue;
@@ -74,6 +79,7 @@ std::vector<Eigen::Vector2d> choose_zones(const SimulationOptions& options, cons
     const auto near = std::count_if(layout.truth.frames.begin(), layout.truth.frames.end(), [&](const Pose& pose) {
       return (pose.centre.head<2>() - crossing).norm() < kAround;
     });
+    // One street alone has 2 kAround of its way inside the circle. More means that a second street or drive is there.
     if (static_cast<double>(near) * options.frame_distance_m > 2 * kAround) driven.push_back(crossing);
   }
   if (std::ssize(driven) < options.control_zones)
@@ -104,6 +110,7 @@ void simulate_control_zones(const SimulationOptions& options, const Observer& ob
   if (options.control_zones == 0) return;
   const std::vector<Eigen::Vector2d> zones = choose_zones(options, layout);
   for (std::size_t z = 0; z < zones.size(); ++z) {
+    // Beyond the streams of simulate_control(), whose numbers are ints.
     Random random(options.seed, Random::Purpose::kControl, (1ULL << 32) + z);
     const auto wanted = kFewest + random.below(kMost - kFewest + 1);
     const bool held_out = static_cast<int>(z) == options.held_out_zone;
@@ -116,11 +123,14 @@ void simulate_control_zones(const SimulationOptions& options, const Observer& ob
       if (!surface) continue;
       std::vector<Sighting> seen = observer.sightings(*surface);
       while (seen.size() > kMeasurements) seen.erase(seen.begin() + random.below(std::ssize(seen)));
+      // The sightings ascend by image. First and last in one frame means that all are, and the rig alone is a short
+      // base.
       if (seen.size() < 3 ||
           layout.block.images[seen.front().image].frame == layout.block.images[seen.back().image].frame)
         continue;
       taken.push_back(place);
       ControlPoint point = measure_control(options, surface->position, seen, random);
+      // A held-out zone changes the roles alone, so that two simulations differ in nothing else.
       point.role = held_out || made % kCheckEvery == kCheckEvery - 1 ? PointRole::kCheck : PointRole::kControl;
       point.name.append("zone").append(std::to_string(z)).append("_").append(std::to_string(made));
       layout.block.control_points.push_back(std::move(point));

@@ -59,6 +59,7 @@ Observer::Observer(const Layout& layout, double margin_px) : layout_(layout), ma
 void Observer::look(std::int64_t frame, const SurfacePoint& point, std::vector<Sighting>& seen) const {
   const Pose& pose = layout_.truth.frames[FrameIndex(frame)];
   if ((pose.centre - point.position).head<2>().norm() > layout_.scene->range_m()) return;
+  // All cameras of the rig are tested from its origin: their lever arms are small against the surfaces.
   if (!layout_.scene->visible(pose.centre, point)) return;
   const auto cameras = static_cast<std::int64_t>(layout_.block.rigs[RigIndex(0)].mounts.size());
   for (std::int64_t i = frame * cameras; i < (frame + 1) * cameras; ++i) {
@@ -71,6 +72,7 @@ std::optional<Eigen::Vector2d> Observer::pixel_of(ImageIndex image, const Eigen:
   const View& view = views_[static_cast<std::size_t>(image.value)];
   const Eigen::Vector3d inside = view.rotation * (place - view.centre);
   const bool all_around = all_around_[static_cast<std::size_t>(view.camera)] != 0;
+  // No camera sees closer than half a metre. This also excludes points behind a camera that sees to one side.
   if ((all_around ? inside.norm() : inside.z()) < 0.5) return std::nullopt;
   const CameraIndex camera(view.camera);
   const double radius_sq = inside.head<2>().squaredNorm() / (inside.z() * inside.z());
@@ -86,6 +88,8 @@ std::optional<Eigen::Vector2d> Observer::pixel_of(ImageIndex image, const Eigen:
 
 std::vector<Sighting> Observer::sightings(const SurfacePoint& point) const {
   std::vector<Sighting> seen;
+  // A frame within the range lies in the cell of the point or in one of its eight neighbours, because a cell is as
+  // large as the range.
   const Eigen::Vector2d place = (point.position.head<2>() - origin_) / cell_m_;
   const auto column = static_cast<std::int64_t>(std::floor(place.x())),
              row = static_cast<std::int64_t>(std::floor(place.y()));

@@ -29,9 +29,11 @@ std::vector<Eigen::Quaterniond> panorama_rotations(double horizontal_rad, double
   for (std::int64_t row = 0; row < kRows; ++row) {
     const std::int64_t count = images / kRows + (row < images % kRows);
     const double pitch = static_cast<double>(row == 0 ? 0 : row == 1 ? 1 : -1) * 0.5 * vertical_rad;
+    // A turn by `angle` about the vertical moves the image only by angle cos(pitch) on the sphere.
     const double angle = std::min(2 * std::numbers::pi / static_cast<double>(std::max<std::int64_t>(1, count)),
                                   step * horizontal_rad / std::cos(pitch));
     for (std::int64_t i = 0; i < count; ++i) {
+      // Rows begin a third of a turn apart, so that the seams of one row lie inside the images of the others.
       const double yaw = angle * (static_cast<double>(i) + static_cast<double>(row) / kRows);
       const Eigen::Vector3d ahead(std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch), std::sin(pitch));
       const Eigen::Vector3d right(std::sin(yaw), -std::cos(yaw), 0);
@@ -55,6 +57,7 @@ std::vector<Eigen::Vector3d> geodesic_sphere(int times) {
         points.push_back(p.normalized());
       }
   std::vector<std::array<int, 3>> faces;  // triples of neighbours
+  // Neighbours have the cosine 1 / sqrt 5 = 0.447; the next vertices -0.447.
   const auto near = [&](int i, int j) { return points[i].dot(points[j]) > 0.4; };
   for (int i = 0; i < 12; ++i)
     for (int j = i + 1; j < 12; ++j)
@@ -63,6 +66,7 @@ std::vector<Eigen::Vector3d> geodesic_sphere(int times) {
   for (int round = 0; round < times; ++round) {
     std::map<std::pair<int, int>, int> middles;
     const auto middle = [&](int i, int j) {
+      // Two faces share an edge, and with it its middle.
       const auto [entry, added] = middles.try_emplace(std::minmax(i, j), static_cast<int>(points.size()));
       if (added) points.push_back((points[i] + points[j]).normalized());
       return entry->second;

@@ -1,4 +1,13 @@
 // Simulates priors and given poses. Every stated sigma is the true one.
+//
+// With the true pose (R, C) of a frame and normal errors n:
+//
+//     position    P = C + R' a + gps_sigma n         of the antenna; a is its lever arm in axes of the rig
+//     attitude    R_m = Exp(sigma n) R               the error turns about the axes of the rig
+//     relative    R_ab = Exp(sigma n) R_b R_a',  t_ab = R_a (C_b - C_a) + sigma n
+//     given pose  C + sigma e, R Exp(sigma e)        e: DriftingError, about the axes of the ground
+//
+// The job uses the same forms for its residuals, so that every weighted residual of the truth is standard normal.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -19,6 +28,7 @@ std::vector<std::uint8_t> frames_with_position(const SimulationOptions& options)
   Random random(options.seed, Random::Purpose::kPriors);
   std::vector<std::uint8_t> chosen(total, 0);
   for (std::size_t i = 0; i < wanted; ++i) {
+    // The first steps of a Fisher-Yates shuffle.
     std::swap(order[i], order[i + static_cast<std::size_t>(random.below(static_cast<std::int64_t>(total - i)))]);
     chosen[order[i]] = 1;
   }
@@ -29,6 +39,8 @@ std::vector<std::uint8_t> frames_with_position(const SimulationOptions& options)
 // the standard deviation 1 per axis.
 class DriftingError {
  public:
+  // s_i = m s_{i-1} + sqrt(1 - m^2) n has the variance 1, and e_i = k s_i + sqrt(1 - k^2) n as well. m = 0.97 is a
+  // correlation length of 33 frames.
   Eigen::Vector3d next(bool new_pass, Random& random) {
     constexpr double kSlow = 0.9, kMemory = 0.97;
     const Eigen::Vector3d step = random.normal3();
@@ -51,8 +63,11 @@ class IntegratedChain {
       Random random(options_.seed, Random::Purpose::kChain, static_cast<std::uint64_t>(frame));
       const Eigen::Vector3d direction = random.normal3().normalized();
       here_ = truth;
+      // The cubic root makes the shifts uniform in the ball.
       here_.centre += options_.start_offset_m * std::cbrt(random.uniform(0, 1)) * direction;
     } else {
+      // C_b = C_a + R_a' t_ab and R_b = R_ab R_a. The errors of the relative rotations add up, so the far end of a pass
+      // bends away.
       here_.centre += here_.rotation.conjugate() * relative->pose.centre;
       here_.rotation = (relative->pose.rotation * here_.rotation).normalized();
     }
@@ -85,6 +100,7 @@ RelativePose measure_relative(const SimulationOptions& options, const BlockState
 void simulate_priors(const SimulationOptions& options, SimulatedBlock& simulated) {
   Block& block = simulated.block;
   const bool street = options.scene == SimulationOptions::Scene::kStreet;
+  // In axes of the rig, x right, y down, z ahead: the antenna is 0.6 m above the cameras.
   const Eigen::Vector3d lever_arm = street ? Eigen::Vector3d(0.1, -0.6, -0.2) : Eigen::Vector3d::Zero();
   const bool given = options.start_position_error_m >= 0 && options.start_rotation_error_deg >= 0;
   const std::vector<std::uint8_t> with_position = frames_with_position(options);

@@ -1,3 +1,5 @@
+// The order of the parts is fixed: layout (cameras, mounts, poses), control points, tie points, priors. Each draws from
+// streams of its own, so that an option of one part leaves the others as they are.
 #include "io/simulate/blocks/simulate.h"
 
 #include <cmath>
@@ -179,6 +181,7 @@ CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layou
   camera.intrinsics = start_intrinsics(model, options.focal_px, options.image_width, options.image_height);
 
   Intrinsics truth = camera.intrinsics;
+  // Only the initial value changes, not the truth.
   if (!is_fixed(model, kFocal)) camera.intrinsics[kFocal] *= options.start_focal;
   const IntrinsicSigmas weak = weak_sigmas(truth, 0.01 * options.focal_px, options.image_width);
   const auto estimated = [&](int parameter) { return weak[static_cast<std::size_t>(parameter)] > 0; };
@@ -201,6 +204,7 @@ CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layou
     truth = published_cameras()[static_cast<std::size_t>(options.published_camera - 1)].truth;
   if (options.calibrate) {
     constexpr double kFree = std::numeric_limits<double>::infinity();
+    // The true Brown camera has no k3, so k3 is held at zero.
     if (model == CameraModel())
       camera.prior_sigma = {kFree, kFree, kFree, kFree, kFree, 0, kFree, kFree};
     else
@@ -221,6 +225,7 @@ void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, do
   frame.name = frame_name(index.value);
   frame.rig = rig;
   frame.pass = pass;
+  // Seconds since 1970: the block was taken in September 2020. A plausible time is needed for EXIF.
   frame.time_s = 1.6e9 + time_s;
   for (std::size_t m = 0; m < cameras; ++m) {
     std::string name = frame.name;
@@ -263,6 +268,8 @@ SimulatedBlock simulate_block(const SimulationOptions& options, const TrackSink&
                               std::int64_t batch_observations) {
   options.check();
   Layout layout = make_layout(options);
+  // Without positions and control the job has nothing that ties it to the earth. A ground frame that claims this would
+  // be wrong.
   layout.block.ground.georeferenced =
       options.gps_sigma_m > 0 || options.control_points > 0 || options.control_zones > 0;
   if (layout.block.ground.georeferenced) layout.block.ground = {true, 48.85, 2.35, 100, "EPSG:4326"};

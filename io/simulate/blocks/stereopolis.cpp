@@ -35,6 +35,8 @@ class StereopolisScene : public StreetScene {
   }
 
   std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override {
+    // Where the ramp is two metres high, its walls have their full height and hide the ground. Below, half of the
+    // points are on the bridge.
     const double rise = rise_under(frame.centre);
     if (rise > 0 && (rise > 2 || random.uniform() < 0.5)) return sample_bridge(frame, random);
     auto point = StreetScene::sample(frame, random);
@@ -64,9 +66,11 @@ class StereopolisScene : public StreetScene {
     if (std::abs(point.normal.z()) < 0.5) {
       constexpr double kWindow = 3;  // metres
       const Eigen::Vector3d along(-point.normal.y(), point.normal.x(), 0);
+      // One to three windows further: 3, 6 or 9 m.
       mistake.offset = sense * kWindow * std::ceil(3 * size + 1e-9) * along;
     } else {
       mistake.verdict = Verdict::kVehicle;
+      // A spot on a vehicle, a metre above the road, at 3 to 12 m/s.
       mistake.offset.z() = 1;
       mistake.velocity[direction_at(point.position)] = sense * (3 + 9 * size);
     }
@@ -110,6 +114,8 @@ Route make_route(std::int64_t streets, double spacing) {
   const double far = static_cast<double>(streets - 1) * spacing;
   const bool even = streets % 2 == 0;
   if (even) corners.insert(corners.end(), {{0, far}, {0, 0}});  // with an odd number, the route is closed already
+  // The streets along x have the corners 0 to 2 n - 1, so the second street along y ends at corner 2 n + 3. The bridge
+  // is on the second street along x, and the second street along y goes below it: after it, the drive has been at both.
   return {Drive(std::move(corners)), static_cast<std::size_t>(2 * streets + 3), even ? spacing : far - spacing};
 }
 
@@ -149,6 +155,7 @@ void add_drive(const SimulationOptions& options, const StereopolisScene& scene, 
     const auto index = static_cast<std::uint64_t>(layout.block.frames.size());
     Random random(options.seed, Random::Purpose::kFrame, index);
     double s = options.frame_distance_m * (static_cast<double>(i) + random.uniform(-0.1, 0.1));
+    // The same way from its end to its beginning, half a distance off, so that frames of two drives do not coincide.
     if (drive % 2 == 1) s = options.frame_distance_m * (static_cast<double>(frames) - 0.5) - s;
     const double turn = drive % 2 == 1 ? -1 : 1;
     const Eigen::Vector2d forward = turn * (way.at(wrap(s + 5)) - way.at(wrap(s - 5))).normalized();
@@ -156,6 +163,7 @@ void add_drive(const SimulationOptions& options, const StereopolisScene& scene, 
     const Eigen::Vector2d place = way.at(wrap(s)) + (kLane + 0.1 * random.normal()) * right;
     const bool along_x = std::abs(forward.x()) > std::abs(forward.y());
     const double height = scene.road_height(place, along_x);
+    // The nose follows the road: the difference of height over four metres.
     const double slope =
         0.25 * (scene.road_height(place + 2 * forward, along_x) - scene.road_height(place - 2 * forward, along_x));
     Pose pose;
@@ -177,6 +185,7 @@ Layout make_stereopolis_layout(const SimulationOptions& options) {
   const double spacing = options.street_spacing_m;
   const Route route = make_route(streets, spacing);
   std::optional<Bridge> bridge;
+  // The ramps end kRampGap before the neighbouring crossings, so that these are level.
   if (with_bridge) bridge.emplace(Eigen::Vector2d(route.bridge_x, spacing), spacing - kRampGap);
   for (std::int64_t j = 0; j < streets; ++j)
     for (std::int64_t i = 0; i < streets; ++i) {
@@ -189,6 +198,7 @@ Layout make_stereopolis_layout(const SimulationOptions& options) {
   double start = 0;
   for (int drive = 0; drive < options.drives; ++drive) {
     const int day = drive * options.days / options.drives;
+    // A drive begins after the break, and not before its day.
     start = std::max(start, day * kDay);
     add_drive(options, *scene, drive % 4 < 2 ? route.drive : turned, drive, start, layout);
     start += static_cast<double>(frames_of_drive(options, drive)) * options.frame_distance_m / kSpeed + kBreak;

@@ -44,6 +44,8 @@ void add_drive(const SimulationOptions& options, const StreetScene& scene, const
     pose.centre << place, scene.ground(place.x(), place.y()) + kRigHeight + 0.02 * random.normal();
     pose.rotation =
         rotation_update(level_rotation(forward), kDegree * Eigen::Vector3d(0.5, 0.5, 1).cwiseProduct(random.normal3()));
+    // A million seconds lie between the drives, so that times of different drives are far from each other (unless a
+    // drive has a million frames).
     add_simulated_frame(layout, pose, pass, static_cast<double>(i) + 1e6 * static_cast<double>(pass));
   }
 }
@@ -67,6 +69,7 @@ Layout make_street_layout(const SimulationOptions& options) {
   const std::int64_t first = (options.frames + 1) / 2;
   const double needed = options.frame_distance_m * static_cast<double>(first);
   std::int64_t streets = 2;
+  // The smallest grid that is longer than the first drive.
   while (Drive(drive_corners(streets, options.street_spacing_m)).length() < needed) ++streets;
   const Drive drive(drive_corners(streets, options.street_spacing_m));
   add_drive(options, *scene, drive, 0, first, layout);

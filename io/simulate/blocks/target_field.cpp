@@ -24,6 +24,7 @@ class TargetField : public Scene {
   // A random point on one of the four walls or on the ground. In the sparse scene, on the wall ahead only.
   std::optional<SurfacePoint> sample(const Pose&, Random& random) const override {
     const double u = random.uniform(-1, 1), v = random.uniform();
+    // The walls get three quarters of the points, each in proportion to its length, and the ground one quarter.
     const double place = one_wall_ ? 0 : random.uniform(0, 2 * (kHalfLength + kHalfWidth) / 0.75);
     const double x = u * kHalfLength, y = u * kHalfWidth, z = v * kWallHeight;
     if (place < kHalfWidth) return SurfacePoint{{kHalfLength, one_wall_ ? 0.3 * y : y, z}, -Eigen::Vector3d::UnitX()};
@@ -56,6 +57,8 @@ std::vector<Eigen::Vector2d> circle(double rx, double ry) {
 std::vector<Eigen::Vector2d> s_shape(double radius) {
   std::vector<Eigen::Vector2d> corners;
   for (int k = 0; k <= 48; ++k) {
+    // First half: a circle about (-r, 0) clockwise over its upper side; second half: one about (r, 0) counter-clockwise
+    // over its lower side.
     const double angle = std::numbers::pi * (1 - k / 24.0);
     const double side = k <= 24 ? -1 : 1;
     corners.emplace_back(radius * (side + std::cos(k <= 24 ? angle : angle + std::numbers::pi)),
@@ -66,6 +69,7 @@ std::vector<Eigen::Vector2d> s_shape(double radius) {
 
 std::vector<Eigen::Vector2d> path_corners(Path path) {
   switch (path) {
+    // Half a metre of way: the frames of a single standpoint stand close together, not at one point.
     case Path::kSingle:
       return {{0, 0}, {0.5, 0}};
     case Path::kLoop:

@@ -21,6 +21,7 @@ namespace megablock {
 
 namespace {
 
+// The proposals of a group see the counts before it. In small groups these are recent.
 constexpr std::int64_t kGroup = 64;  // frames
 constexpr int kMostExtra = 2;        // a track gets at most so many observations in place of those that others lack
 // A frame with a smaller share of the wanted observations gets more points.
@@ -130,6 +131,7 @@ class TrackMaker {
     const auto in_frame =
         std::count_if(seen.begin(), seen.end(), [&](const Sighting& s) { return frame_of(s) == frame; });
     if (in_frame == 0 || in_frame == std::ssize(seen)) return std::nullopt;
+    // Two plus Poisson: the mean is mean_track, and no track is shorter than two.
     const int wanted = 2 + random.poisson(options_.mean_track - 2);
     return Proposal{*point, wanted, first_choice(frame, seen, wanted + kMostExtra, random)};
   }
@@ -137,6 +139,8 @@ class TrackMaker {
   // Selects `count` candidates: the seeding frame first, then the images with the highest preference.
   std::vector<Sighting> first_choice(FrameIndex frame, const std::vector<Sighting>& seen, std::ptrdiff_t count,
                                      Random& random) const {
+    // Three tracks in ten may join two visits. Such tracks tie the drives to each other; without them each drive would
+    // be a block of its own.
     const bool two_passes = layout_.scene->along_passes() && random.uniform() < 0.3;
     const std::int64_t pass = layout_.block.frames[frame].pass;
     struct Candidate {
@@ -148,6 +152,8 @@ class TrackMaker {
     bool owned = false;
     for (const Sighting& s : seen) {
       const FrameIndex other = frame_of(s);
+      // Aerial: the fraction decides, frames that have enough come last. Streets: the distance in frames decides, the
+      // fraction only among the cameras of a frame.
       double rank = random.uniform();
       if (layout_.scene->along_passes()) {
         // Frames of another visit are ranked by distance, because their time has no relation to that of the first
@@ -211,6 +217,8 @@ class TrackMaker {
       const bool stray = agreed ? !wrong.pixels[i - wrong.begin] : random.uniform() < wrong.stray_share;
       const Eigen::Vector2d place = agreed && !stray ? *wrong.pixels[i - wrong.begin] : seen[i].pixel;
       Eigen::Vector2d pixel;
+      // An observation outside the image is drawn again. The margin of the sightings (image_margin()) makes this rare,
+      // so that the noise keeps its distribution.
       do {
         const double a = stray ? random.uniform() : random.normal(), b = stray ? random.uniform() : random.normal();
         pixel = stray ? Eigen::Vector2d(a * camera.width, b * camera.height)

@@ -17,6 +17,7 @@ struct Placing {
   Eigen::Vector3d centre;  // metres
 };
 
+// The cameras of the head stand on a circle of 0.25 m about its axis.
 Eigen::Vector3d on_head(double yaw_deg, double up) {
   return {0.25 * std::sin(kDegree * yaw_deg), -up, 0.25 * std::cos(kDegree * yaw_deg)};
 }
@@ -46,6 +47,7 @@ std::vector<Placing> places() {
 
 Pose nominal_mount(const Placing& place) {
   const double yaw = kDegree * place.yaw_deg, pitch = kDegree * place.pitch_deg;
+  // The rows of R are the axes of the camera in axes of the rig; down = ahead x right.
   const Eigen::Vector3d right(std::cos(yaw), 0, -std::sin(yaw));
   const Eigen::Vector3d ahead(std::sin(yaw) * std::cos(pitch), -std::sin(pitch), std::cos(yaw) * std::cos(pitch));
   Eigen::Matrix3d r;
@@ -101,11 +103,13 @@ void add_vehicle(const SimulationOptions& options, Layout& layout) {
   for (const Placing& place : chosen) {
     std::string name("c");
     name.append(std::to_string(place.id));
+    // Each camera has a stream by its name, so that a smaller rig is a part of a larger one.
     Random random(options.vehicle_seed ? options.vehicle_seed : options.seed, Random::Purpose::kCamera,
                   2000 + static_cast<std::uint64_t>(place.id));
     Mount mount;
     mount.pose = nominal_mount(place);
     Pose real = mount.pose;
+    // Drawn also for the first mount, so that its camera stays the same in any rig.
     const Eigen::Vector3d shift = random.normal3(), turn = random.normal3();
     if (!rig.mounts.empty()) {
       real.centre += options.mount_position_error_m * shift;

@@ -20,6 +20,7 @@ WrongGroup draw_wrong_group(const SimulationOptions& options, const Layout& layo
   const auto most = static_cast<std::int64_t>(seen.size() / 2);
   const double mean = 0.5 * static_cast<double>(1 + most);
   const bool drawn = random.uniform() < group_share * n / mean;
+  // Both are drawn in any case, so that another positive outlier_share leaves the later draws as they are.
   const std::int64_t length = 1 + random.below(most);
   const std::int64_t begin = random.below(std::ssize(seen) - length + 1);
   if (!drawn) return group;
@@ -31,6 +32,8 @@ WrongGroup draw_wrong_group(const SimulationOptions& options, const Layout& layo
   for (std::int64_t i = begin; i < begin + length; ++i) {
     const Sighting& s = seen[static_cast<std::size_t>(i)];
     const double elapsed = time_of(s) - time_of(seen[group.begin]);
+    // Half a second of the way lies between the point and the vehicle in the first observation, so that this one is
+    // wrong too. After ten seconds a vehicle is out of sight; the observation is then an outlier anywhere.
     const Eigen::Vector3d place = point.position + mistake->offset + mistake->velocity * (0.5 + elapsed);
     auto pixel = std::abs(elapsed) < 10 ? observer.pixel_of(s.image, place) : std::nullopt;
     // If the wrong place is on the line of sight, its pixel is too near the right one to be an outlier.

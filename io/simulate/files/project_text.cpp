@@ -14,6 +14,7 @@ void refuse_edited_project(const std::string& folder, const std::string& text, E
   const std::filesystem::path path = std::filesystem::path(folder) / "block.yaml";
   if (edited == EditedProject::kOverwrite || !std::filesystem::exists(path)) return;
   std::ifstream file(path);
+  // The same simulation may be written again. Only a text that this program would not write counts as edited.
   if (std::string(std::istreambuf_iterator<char>(file), {}) == text) return;
   throw InputError(
       path.string() +

@@ -57,6 +57,8 @@ void write_simulated_block(const SimulationOptions& options, const std::string& 
   tie_points.close();
   truth_tracks.close();
 
+  // The ground frame and the priors exist only after the tracks. block.yaml is the last file, so that an interrupted
+  // first run leaves no project that can be started.
   write_block((root / "given.h5").string(), simulated.block);
   write_state((root / "truth.h5").string(), simulated.truth);
   write_pose_csv((root / "truth.csv").string(), pose_table(simulated.block, simulated.truth));

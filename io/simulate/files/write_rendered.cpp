@@ -35,6 +35,7 @@ bool is_stereopolis(const SimulationOptions& options) {
 Layout make_city_layout(const SimulationOptions& options) {
   Layout layout = make_layout(options);
   layout.block.ground = {true, 48.85, 2.35, 100, "EPSG:4979"};
+  // The rendered surfaces replace those of the layout, so that control points lie on what the images show.
   layout.scene = std::make_unique<City>(options, layout);
   return layout;
 }
@@ -48,6 +49,8 @@ Pose image_pose(const Layout& layout, ImageIndex image) {
 // The name that the program will give to a camera because of the headers of its images.
 std::string name_by_headers(const Camera& camera) {
   std::ostringstream name;
+  // The name is make, model, size and focal length, as for any image (image_scan.h). The sensor is 10 mm wide
+  // (image_file.cpp).
   name << "Megablock Simulated " << camera.name << ' ' << camera.width << 'x' << camera.height << ' ' << std::fixed
        << std::setprecision(2) << camera.intrinsics[kFocal] * 10 / std::max(camera.width, camera.height) << "mm";
   return name.str();
@@ -104,6 +107,7 @@ void write_rig(const Block& block, const fs::path& root) {
   nlohmann::ordered_json cameras, assignments;
   for (const Mount& mount : block.rigs.front().mounts) {
     const Eigen::Vector3d rotation = rotation_log<double>(mount.pose.rotation);
+    // X_camera = R (X_rig - C) = R X_rig + t, so t = -R C.
     const Eigen::Vector3d translation = -(mount.pose.rotation * mount.pose.centre);
     cameras[block.cameras[mount.camera].name] = {{"rotation", {rotation.x(), rotation.y(), rotation.z()}},
                                                  {"translation", {translation.x(), translation.y(), translation.z()}}};

@@ -1,3 +1,12 @@
+// A ray is p(t) = origin + t direction with a unit direction, so t is the distance in metres. The nearest hit of
+// terrain and boxes counts.
+//
+//     terrain   HeightGrid::intersect(): sphere tracing, then Newton
+//     boxes     nearest_box(): walk over the cells of a grid in plan, slab test per box
+//
+// The colour is light (sun 0.5 max(0, n . s) unless a box shades it, plus 0.6 of sky) times the base colour of the
+// surface times its texture. Nothing depends on the image except the footprint of the pixel, so the same spot looks the
+// same in all images.
 #include "io/simulate/images/city.h"
 
 #include <algorithm>
@@ -57,6 +66,7 @@ double HeightGrid::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3
     if (direction.z() >= 0) return kInfinity;
     t = (highest_ - origin.z()) / direction.z();
   }
+  // The ray falls at least twice as fast as the ground can rise.
   const bool steep = -direction.z() > 2 * (closing + direction.z());
   if (steep && guess > 0) t = guess;  // a steep ray meets the ground only once, so any start is safe
   for (int i = 0; i < 200 && t < limit; ++i) {
@@ -64,6 +74,8 @@ double HeightGrid::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3
     const Eigen::Vector3d ground = sample(p.x(), p.y());
     const double above = p.z() - ground[0];
     if (std::abs(above) < 1e-6 * t || (above < 0 && !steep)) return t;
+    // Newton: the derivative of the height above the ground is dz - g . (dx, dy) with the gradient g. The other step is
+    // the sphere-tracing bound: above / closing cannot go below the ground.
     t += steep ? above / (ground[1] * direction.x() + ground[2] * direction.y() - direction.z()) : above / closing;
   }
   return t < limit ? t : kInfinity;
@@ -74,6 +86,7 @@ City::City(const SimulationOptions& options, const Layout& layout)
       street_(options.scene != SimulationOptions::Scene::kAerial),
       range_m_(street_ ? 60 : layout.scene->range_m()),
       intrinsics_(layout.truth.cameras.front()),
+      // The finest wave is three pixels long: 8 m away in streets, on the ground from the air.
       texture_(options.seed, 3 * (street_ ? 8 : options.height_m) / options.focal_px) {
   low_ = high_ = layout.truth.frames.front().centre.head<2>();
   for (const Pose& pose : layout.truth.frames) {
@@ -98,6 +111,7 @@ void City::add_box(const Eigen::Vector2d& low, const Eigen::Vector2d& high, doub
       lowest = std::min(lowest, ground_.height(x, y));
       highest = std::max(highest, ground_.height(x, y));
     }
+  // From a metre below the lowest corner, so that no gap opens over sloping ground.
   boxes_.push_back({{low.x(), low.y(), lowest - 1}, {high.x(), high.y(), highest + height}});
 }
 
@@ -178,6 +192,8 @@ bool enter(const Box& box, const Eigen::Vector3d& origin, const Eigen::Vector3d&
   int face = -1;
   for (int k = 0; k < 3; ++k) {
     const double a = (box.low[k] - origin[k]) * inverse[k], b = (box.high[k] - origin[k]) * inverse[k];
+    // The ray is inside the slab of axis k for t in [min(a, b), max(a, b)], and inside the box where all three overlap.
+    // The last slab that it enters gives the face.
     const double near = std::min(a, b);
     if (near > first) {
       first = near;
@@ -211,6 +227,7 @@ std::int64_t City::nearest_box(const Eigen::Vector3d& origin, const Eigen::Vecto
   std::int64_t c = std::clamp<std::int64_t>(static_cast<std::int64_t>(place.x()), 0, columns_ - 1);
   std::int64_t r = std::clamp<std::int64_t>(static_cast<std::int64_t>(place.y()), 0, rows_ - 1);
   const std::int64_t step_c = direction.x() > 0 ? 1 : -1, step_r = direction.y() > 0 ? 1 : -1;
+  // t at which the ray leaves its cell by a side across x or y; delta_c, delta_r: t from one such side to the next.
   double next_c = (low_.x() + static_cast<double>(c + (step_c > 0)) * cell_m_ - origin.x()) * inverse.x();
   double next_r = (low_.y() + static_cast<double>(r + (step_r > 0)) * cell_m_ - origin.y()) * inverse.y();
   const double delta_c = std::abs(cell_m_ * inverse.x()), delta_r = std::abs(cell_m_ * inverse.y());
@@ -264,6 +281,7 @@ Eigen::Vector3f City::colour(const Hit& hit, const Eigen::Vector3d& direction, d
   if (hit.object == kSky) return {190, 205, 225};
   const Eigen::Vector3d& p = hit.point;
   const double facing = std::max(0.1, -hit.normal.dot(direction));
+  // The pixel covers d a across and d a / cos along the surface. Their geometric mean counts.
   const double footprint = hit.distance * pixel_angle / std::sqrt(facing);
   const auto surface = static_cast<std::uint32_t>(hit.object + 2);
   Eigen::Vector3f base;
@@ -312,6 +330,7 @@ float City::light(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) c
   double sunlight = std::max(0.0, normal.dot(sun));
   double distance = 0;
   int axis = 0;
+  // The start is lifted off the surface, so that a surface does not shade itself.
   if (sunlight > 0 && nearest_box(point + 1e-4 * normal, sun, 500, distance, axis) >= 0) sunlight = 0;
   return 0.6f + 0.5f * static_cast<float>(sunlight);
 }
@@ -337,6 +356,7 @@ bool City::visible(const Eigen::Vector3d& eye, const SurfacePoint& point) const 
   const double distance = sight.norm();
   if (-sight.dot(point.normal) < 0.12 * distance) return false;
   if (street_ && distance > range_m_) return false;
+  // The tolerance is for the point itself, which lies on a surface with rounding errors.
   return cast(eye, sight / distance).distance > distance - 1e-3 * (1 + distance);
 }
 

@@ -14,6 +14,8 @@ namespace megablock {
 
 namespace {
 
+// The sensor is an invention: EXIF states the focal length in millimetres, and the reader turns it back into pixels by
+// the resolution of the focal plane, f_px = f_mm * pixels per mm. Any size gives the same f_px.
 constexpr double kSensor = 10;  // length of the larger side, mm
 
 std::string rational(double value, int denominator) {
@@ -78,6 +80,7 @@ void write_jpeg(const std::string& path, const cv::Mat& image, const SimulatedEx
     data["Exif.Photo.PixelXDimension"] = static_cast<std::uint32_t>(image.cols);
     data["Exif.Photo.PixelYDimension"] = static_cast<std::uint32_t>(image.rows);
     data["Exif.Photo.DateTimeOriginal"] = date_text(exif.time_s);
+    // EXIF keeps fractions of a second in a tag of their own. 1000 would be the next second, and is left out.
     const auto milliseconds = std::llround(1000 * (exif.time_s - std::floor(exif.time_s)));
     if (milliseconds > 0 && milliseconds < 1000) {
       char fraction[4];

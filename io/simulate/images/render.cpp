@@ -16,6 +16,7 @@ RayTable::RayTable(const Camera& camera, const Intrinsics& intrinsics)
 #pragma omp parallel for schedule(static) reduction(&& : complete)
   for (int r = 0; r < rows_; ++r)
     for (int c = 0; c < columns_; ++c) {
+      // The samples lie at a quarter and three quarters of the pixel. (0, 0) is the upper left corner of the image.
       const auto ray = unproject(intrinsics, {0.25 + 0.5 * c, 0.25 + 0.5 * r});
       complete = complete && ray;
       if (ray)
@@ -31,7 +32,7 @@ namespace {
 constexpr float kNoise = 1.5f;           // sigma of the sensor noise, grey values
 constexpr std::int64_t kOnVehicle = -3;  // number of the vehicle among the objects of the city
 
-// Approximately normal: the sum of four uniform numbers.
+// Approximately normal: the sum of four uniform numbers has the variance 4/12, which sqrt 3 makes 1.
 float sensor_noise(std::uint64_t bits) {
   float sum = 0;
   for (int k = 0; k < 4; ++k) sum += static_cast<float>(bits >> (16 * k) & 0xffff) / 65536.0f - 0.5f;
@@ -61,6 +62,8 @@ cv::Mat render_image(const City& city, const RayTable& rays, const Pose& camera,
           hit[k].object = kOnVehicle;
         else
           hit[k] = city.cast(camera.centre, direction[k], guess);
+        // Neighbours in a row meet the ground at almost the same distance. The guess begins anew in each row, so that
+        // the image does not depend on the threads.
         if (hit[k].object == City::kGround) guess = hit[k].distance;
         edge = edge || hit[k].object != hit[0].object;
       }
@@ -77,6 +80,7 @@ cv::Mat render_image(const City& city, const RayTable& rays, const Pose& camera,
           mix_bits(seed + static_cast<std::uint64_t>(row) * 0x9e3779b97f4a7c15ULL + static_cast<std::uint64_t>(column));
       for (int k = 0; k < 3; ++k) {
         bits = mix_bits(bits + 1);
+        // OpenCV's order is blue, green, red.
         const float value = mean[2 - k] + kNoise * sensor_noise(bits);
         line[column][k] = static_cast<unsigned char>(std::clamp(value + 0.5f, 0.0f, 255.0f));
       }

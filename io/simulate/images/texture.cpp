@@ -15,6 +15,7 @@ std::int64_t whole(double x) {
   return i - (x < static_cast<double>(i));
 }
 
+// Smoothstep: its derivative is zero at both ends, so the noise has no kinks at the lattice.
 float smooth(double t) { return static_cast<float>(t * t * (3 - 2 * t)); }
 
 std::uint32_t hash(std::int64_t i, std::int64_t j, std::uint32_t surface) {
@@ -61,10 +62,12 @@ float Texture::discs(double u, double v, double size_m, std::uint32_t surface) c
 float Texture::detail(double u, double v, std::uint32_t surface, double footprint_m) const {
   // Cosine and sine of the angle between successive octaves (about 37 degrees).
   constexpr double kCos = 0.8, kSin = 0.6;
+  // Surfaces share one noise tile, each at a place of its own.
   const double shift = static_cast<double>(surface % 1021) * 17.3;
   double x = u + shift, y = v - shift, wave = finest_m_;
   float sum = 0, amplitude = 0.34f;
   for (int octave = 0; octave < kOctaves; ++octave) {
+    // An octave appears above 1.5 pixels per wave, and is complete at 2.5. Waves shorter than 2 pixels would alias.
     const double sharpness = std::clamp(wave / footprint_m - 1.5, 0.0, 1.0);
     if (sharpness > 0) sum += static_cast<float>(sharpness) * amplitude * noise(x / wave, y / wave);
     const double turned = kCos * x - kSin * y;
@@ -73,6 +76,7 @@ float Texture::detail(double u, double v, std::uint32_t surface, double footprin
     wave *= 2;
     amplitude *= 1.02f;
   }
+  // Discs give the corners and blobs that feature detectors look for, in two sizes.
   for (const double size : {8.0, 37.0}) {
     const double sharpness = std::clamp(0.2 * size * finest_m_ / footprint_m - 0.5, 0.0, 1.0);
     if (sharpness > 0) sum += 0.45f * static_cast<float>(sharpness) * discs(u, v, size * finest_m_, surface);

@@ -43,6 +43,7 @@ VehicleView::VehicleView(const SimulationOptions& options, const RayTable& rays,
         if (!enter(all[k].box, mount.centre, inverse, distance, axis) || distance >= nearest) continue;
         nearest = distance;
         const Eigen::Vector3d p = mount.centre + distance * direction;
+        // A ray towards -axis enters through the face whose normal is +axis.
         surface.face = 2 * axis + (direction[axis] < 0 ? 1 : 0);
         const auto number = static_cast<std::uint32_t>(100 + 8 * k) + static_cast<std::uint32_t>(surface.face);
         const float detail = texture.detail(p[(axis + 1) % 3], p[(axis + 2) % 3], number, distance * pixel_angle);

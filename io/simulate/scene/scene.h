@@ -1,5 +1,12 @@
 // The common parts of all simulated scenes: the frames of a block, the surfaces that they see, and the functions that
 // simulate observations.
+//
+// Coordinates: the ground frame is x east, y north, z up, in metres. A rig and a camera have x right, y down, z ahead.
+// A pose has the rotation R ground -> rig and the centre C in the ground, so that a point X has the rig coordinates R
+// (X - C). Pixels count from the upper left corner of the image; the centre of its first pixel is (0.5, 0.5).
+//
+// Truth and job differ only in the parameters that the job estimates: the true cameras, mounts and poses are in
+// `truth`, and the observations are computed from them. The block holds the initial values and the priors.
 #pragma once
 
 #include <limits>
@@ -26,6 +33,8 @@ class Scene {
   // A random surface point near the frame, not necessarily inside its images. Empty if this draw failed.
   virtual std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const = 0;
   // Whether a point is neither hidden, nor too far away, nor seen at too flat an angle. The frustum is not tested.
+  // The angle between surface and line of sight matters because no matcher finds a point again that one image sees
+  // almost along its surface.
   virtual bool visible(const Eigen::Vector3d& eye, const SurfacePoint& point) const = 0;
   // No frame sees a point that is farther away from it in plan, metres.
   virtual double range_m() const = 0;

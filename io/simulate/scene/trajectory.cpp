@@ -22,6 +22,8 @@ constexpr double kHeadingDrift_deg = 0.045;  // mean of the largest drift of the
 // would have sqrt(2 (1 - c)).
 class SmoothError {
  public:
+  // The first values have the stationary covariance, so there is no run-in: var u = 1 / (1 - c^2), cov(e, u) =
+  // 1 / (1 - c^2)^2, var e = (1 + c^2) / (1 - c^2)^3. next() divides by the root of the last.
   explicit SmoothError(Random& random)
       : u_(random.normal3() / std::sqrt(kLoss)), e_((u_ + kKept * random.normal3() / std::sqrt(kLoss)) / kLoss) {}
   Eigen::Vector3d next(Random& random) {
@@ -44,6 +46,8 @@ struct Stretch {
 // Draws masked stretches of random lengths with the mean `mean`, with clear stretches before, between and after them.
 std::vector<Stretch> draw_stretches(double share, double mean, std::int64_t frames, Random& random) {
   const double masked = share * static_cast<double>(frames);
+  // At least one stretch. All masked lengths are scaled so that they add up to `share` exactly; so a short pass has one
+  // stretch that is shorter than `mean`.
   const auto count = static_cast<std::size_t>(std::max<std::int64_t>(1, std::llround(masked / mean)));
   std::vector<double> lengths(2 * count + 1);  // of the clear and masked stretches in turn, first a clear one
   double sums[] = {0, 0};
@@ -66,6 +70,8 @@ std::vector<Eigen::Vector3d> draw_drift(std::int64_t length, double largest, dou
                                         const Eigen::Vector3d& shape, Random& random) {
   std::array<Eigen::Vector3d, kWaves> amplitudes;
   for (int k = 0; k < kWaves; ++k) amplitudes[k] = shape.cwiseProduct(random.normal3()) / std::pow(k + 1, 3);
+  // The first half wave has no zero inside the stretch. A unit amplitude keeps it dominant, so that the drift grows and
+  // shrinks once, as a smoothed trajectory does.
   amplitudes[0].head(axes).normalize();
   std::vector<Eigen::Vector3d> drift(static_cast<std::size_t>(length) + 1);  // with the frame after the stretch
   double longest = 0, steepest = 0;
@@ -79,6 +85,7 @@ std::vector<Eigen::Vector3d> draw_drift(std::int64_t length, double largest, dou
     before = drift[i];
   }
   drift.pop_back();
+  // Whichever limit is reached first.
   const double scale = std::min(largest / longest, fastest / steepest);
   for (Eigen::Vector3d& d : drift) d *= scale;
   return drift;
@@ -90,8 +97,10 @@ PassErrors draw_pass_errors(const SimulationOptions& options, std::int64_t pass,
   Random random(options.seed, Random::Purpose::kTrajectory, static_cast<std::uint64_t>(pass));
   PassErrors errors;
   errors.gnss.assign(static_cast<std::size_t>(frames), Gnss::kClear);
+  // East, north, up; then the rig's x (pitch), y (down, so heading) and z (roll).
   const Eigen::Vector3d position_sigma(0.02, 0.02, 0.05);
   const Eigen::Vector3d rotation_sigma = kDegree * Eigen::Vector3d(0.02, 0.025, 0.02);
+  // The errors under a clear sky continue below the drift of masked stretches.
   SmoothError position(random), rotation(random);
   for (std::int64_t i = 0; i < frames; ++i) {
     errors.position.push_back(position_sigma.cwiseProduct(position.next(random)));
@@ -107,6 +116,7 @@ PassErrors draw_pass_errors(const SimulationOptions& options, std::int64_t pass,
     const auto turn = draw_drift(length, kDegree * kHeadingDrift_deg * random.uniform(2.0 / 3, 4.0 / 3), kAnySpeed, 3,
                                  {0.5, 1, 0.5}, random);
     // A part of the stretch, at a random place in it, has no satellite at all.
+    // The share without satellites is one of all frames, and stretches have the share gnss_masked_share of them.
     const double absent = static_cast<double>(length) * options.gnss_absent_share / options.gnss_masked_share;
     const double absent_from = random.uniform(0, static_cast<double>(length) - absent);
     for (std::int64_t i = 0; i < length; ++i) {
@@ -133,6 +143,8 @@ void simulate_trajectory(const SimulationOptions& options, SimulatedBlock& simul
       Frame& frame = block.frames[index];
       Pose given = simulated.truth.frames[index];
       given.centre += errors.position[row];
+      // Exp stands on the left, so the error turns about the axes of the rig: roll, pitch and heading have sigmas of
+      // their own.
       given.rotation = (rotation_exp<double>(errors.rotation[row]) * given.rotation).normalized();
       frame.given_pose = given;
       if (options.gps_sigma_m > 0 && errors.gnss[row] != Gnss::kNone)
@@ -141,6 +153,8 @@ void simulate_trajectory(const SimulationOptions& options, SimulatedBlock& simul
         frame.attitude_prior =
             AttitudePrior{given.rotation, Eigen::Vector3d::Constant(kDegree * options.attitude_sigma_deg)};
       if (options.relative_position_sigma_m > 0 && f > begin) {
+        // Odometer and gyroscopes measure the true motion with white noise. They do not feel the drift of the
+        // satellites, which is how an adjustment can find it.
         Random random(options.seed, Random::Purpose::kPriors, 1 + static_cast<std::uint64_t>(f));
         block.relative_poses.push_back(measure_relative(options, simulated.truth, FrameIndex(f - 1), index, random));
       }

@@ -13,6 +13,7 @@ std::vector<Eigen::Vector2d> drive_corners(std::int64_t streets, double spacing)
     corners.emplace_back(j % 2 == 0 ? far : 0, y);
   }
   // The serpentine along y continues from the last corner: at the x of this corner and at the far y.
+  // The last street along x was driven forwards if the number of streets is odd.
   const bool from_far = streets % 2 == 1;
   for (std::int64_t i = 0; i < streets; ++i) {
     const double column = static_cast<double>(i) * spacing, x = from_far ? far - column : column;
@@ -36,6 +37,7 @@ Eigen::Vector2d Drive::at(double s) const {
                   : corners_[i];
 }
 
+// The rows are the axes of the rig in the ground: right = (forward turned by -90 degrees), down = -z, forward.
 Eigen::Quaterniond level_rotation(const Eigen::Vector2d& forward) {
   Eigen::Matrix3d r;
   r.row(0) << forward.y(), -forward.x(), 0;

@@ -27,11 +27,14 @@ inline double off_axis(double x, double spacing) {
 inline double facade_distance(std::uint64_t seed, bool street_along_x, std::int64_t axis, int side, double place) {
   const auto house = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(place / kHouse)));
   const auto street = static_cast<std::uint64_t>(axis * 4 + (street_along_x ? 2 : 0) + (side > 0 ? 1 : 0));
+  // A hash instead of a stored list: the distance of any house is known without the others, and tie points and rendered
+  // houses agree on it. The last factor maps 53 bits to [0, 2), so the result is kFacade +- kFacadeDepth.
   const std::uint64_t bits = mix_bits(mix_bits(seed + house) + street);
   return kFacade + kFacadeDepth * (static_cast<double>(bits >> 11) * 0x1p-52 - 1);
 }
 
 inline Terrain street_terrain(const SimulationOptions& options) {
+  // Street blocks of this scene are nearly level; the Stereopolis scene has the full relief.
   const double share = options.scene == SimulationOptions::Scene::kStreet ? 0.2 : 1;
   return Terrain(options.seed, share * options.terrain_relief_m, 400);
 }

@@ -29,6 +29,7 @@ std::optional<SurfacePoint> StreetScene::sample(const Pose& frame, Random& rando
     point.position[across] = axis + side * random.uniform(3.5, kFacade - kFacadeDepth);
     point.normal.z() = 1;
   } else {
+    // A facade has no place where another street opens.
     if (off_axis(place, spacing_) < kFacade + kFacadeDepth) return std::nullopt;  // a crossing
     point.position[across] = axis + side * facade_distance(seed_, street_along_x, street, side, place);
     point.normal[across] = -side;
@@ -41,11 +42,14 @@ std::optional<SurfacePoint> StreetScene::sample(const Pose& frame, Random& rando
 bool StreetScene::visible(const Eigen::Vector3d& eye, const SurfacePoint& point) const {
   const Eigen::Vector3d sight = point.position - eye;
   const double distance = sight.norm();
+  // 0.12 is the sine of 7 degrees between surface and line of sight.
   if (distance > kRange || distance < 2 || -sight.dot(point.normal) < 0.12 * distance) return false;
   for (const int across : {0, 1})  // whether both ends are in one street
     if (nearest_axis(eye[across], spacing_) == nearest_axis(point.position[across], spacing_) &&
         std::max(off_axis(eye[across], spacing_), off_axis(point.position[across], spacing_)) <= kFacade + kFacadeDepth)
       return true;
+  // Otherwise the ends are in two streets, and the line must stay over one of them at every step, that is turn at their
+  // crossing.
   constexpr int kSteps = 12;
   for (int i = 1; i < kSteps; ++i) {
     const Eigen::Vector3d place = eye + sight * (static_cast<double>(i) / kSteps);
