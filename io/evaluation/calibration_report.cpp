@@ -14,6 +14,7 @@ namespace {
 
 using OrderedJson = nlohmann::ordered_json;
 
+// JSON has no NaN; an unknown figure is null.
 OrderedJson number(double value) { return std::isfinite(value) ? OrderedJson(value) : OrderedJson(nullptr); }
 
 OrderedJson fit_json(const RigFit& fit) {
@@ -33,6 +34,7 @@ OrderedJson fit_json(const RigFit& fit) {
 OrderedJson mount_json(const MountCalibration& m) {
   return {{"name", m.name},
           {"held", m.held},
+          // Relative to the mount at the start: the length of the shift, and the angle of the whole rotation.
           {"moved_m", (m.pose.centre - m.start.centre).norm()},
           {"turned_deg", m.start.rotation.angularDistance(m.pose.rotation) * kDegreesPerRadian},
           {"position_sigma_m", m.position_sigma_m()},

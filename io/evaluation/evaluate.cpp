@@ -85,6 +85,7 @@ std::vector<Match> match_by_name(const BlockResult& result, const PoseTable& tru
 
 // Whether nothing except the images determines the datum.
 bool is_free(const BlockResult& result) {
+  // The words of the adjustment decide. A file without them is judged by its observations.
   if (!result.gauge.empty()) return result.gauge.starts_with("free");
   for (std::size_t f = 0; f < result.block.frames.size(); ++f) {
     const FrameIndex frame(static_cast<std::int64_t>(f));
@@ -111,6 +112,7 @@ Similarity align(const BlockResult& result, const std::vector<Match>& matches) {
 
 // The truth in the ground frame of the result, if both frames are known; otherwise the truth as it is.
 PoseTable in_ground_of(const GroundFrame& ground, const PoseTable& truth) {
+  // 1e-12 degrees are 0.1 micrometres on the ground.
   const auto same = [](double a, double b, double tolerance) { return std::abs(a - b) <= tolerance; };
   if (!truth.ground || !truth.ground->georeferenced || !ground.georeferenced) return truth;
   if (same(ground.latitude_deg, truth.ground->latitude_deg, 1e-12) &&
@@ -122,6 +124,7 @@ PoseTable in_ground_of(const GroundFrame& ground, const PoseTable& truth) {
       of_result.own_from_block({truth.ground->latitude_deg, truth.ground->longitude_deg, truth.ground->height_m});
   PoseTable moved = truth;
   moved.ground = ground;
+  // R_truth maps axes of the truth's frame to the camera, so R_truth turn maps axes of the result's frame.
   for (Pose& pose : moved.poses)
     pose = {(pose.rotation * turn).normalized(), of_result.to_local(of_truth.to_geodetic(pose.centre))};
   return moved;
@@ -135,6 +138,7 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
   double largest = 0;
   const bool positions_used = option_of(result, "adjustment.use_position_priors") != "false",
              attitudes_used = option_of(result, "adjustment.use_attitude_priors") != "false";
+  // A covariance C of a vector v becomes A C A' for A v: A = R for rotation vectors, A = s R for positions.
   const Eigen::Matrix3d turn = similarity.rotation.toRotationMatrix();
   const Eigen::Matrix3d stretch = similarity.scale * turn;
   Eigen::Vector3d previous_error = Eigen::Vector3d::Zero();
@@ -142,17 +146,20 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
     const Match& m = matches[i];
     const Pose pose = similarity(result.state.frames[m.frame]);
     const Eigen::Vector3d error = pose.centre - m.truth.centre;
+    // w of R_true = R_adjusted Exp(w), in axes of the ground, as the covariances are (rotation_update).
     const Eigen::Vector3d angle = rotation_log<double>(pose.rotation.conjugate() * m.truth.rotation);
     position.add(error.squaredNorm());
     rotation.add(angle.squaredNorm());
     largest = std::max(largest, error.norm());
-    // Successive frames of one pass are neighbours.
+    // Successive frames of one pass are neighbours. Their errors share the slow bending of the block, which cancels in
+    // the difference; local accuracy remains.
     const auto& frames = result.block.frames;
     if (i > 0 && matches[i - 1].frame.value == m.frame.value - 1 &&
         frames[matches[i - 1].frame].pass == frames[m.frame].pass)
       relative.add((error - previous_error).squaredNorm());
     previous_error = error;
     if (result.frame_covariance.empty()) continue;
+    // Order of the increment: rotation, centre.
     const BlockResult::Matrix6 covariance = variance_factor * result.frame_covariance[m.frame];
     const Eigen::Matrix3d rotation_covariance = turn * covariance.topLeftCorner<3, 3>() * turn.transpose(),
                           position_covariance = stretch * covariance.bottomRightCorner<3, 3>() * stretch.transpose();
@@ -195,6 +202,8 @@ void evaluate_control(const BlockResult& result, double variance_factor, Evaluat
     if (point.role != PointRole::kCheck) continue;
     horizontal.add(error.head<2>().squaredNorm());
     vertical.add(error.z() * error.z());
+    // Block and given position have independent errors, so the variances add. A control point took part, so its
+    // difference is no error, and it has no normalised one here.
     const Eigen::Matrix3d stated = point.sigma.cwiseAbs2().asDiagonal();
     normalised.add(error, variance_factor * found.covariance + stated);
   }
@@ -216,6 +225,7 @@ Evaluation evaluate(const BlockResult& result, const PoseTable& truth, const Eva
   evaluation.aligned = options.align == EvaluateOptions::Align::kAlways ||
                        (options.align == EvaluateOptions::Align::kAuto && is_free(result));
   const Similarity similarity = evaluation.aligned ? align(result, matches) : Similarity();
+  // Never twice.
   const double variance_factor = options.scale_sigma && !result.sigma_scaled ? result.variance_factor : 1;
   evaluate_frames(result, matches, similarity, variance_factor, evaluation);
   // The given positions of check points are in the ground frame of the block. A free block is in another frame, so they

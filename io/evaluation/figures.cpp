@@ -135,6 +135,8 @@ class Gatherer {
            result_.state.cameras.size() == block_.cameras.size() && result_.state.mounts.size() == block_.rigs.size();
   }
   void prepare() {
+    // Lengths 2 to 14, and 15 and more; angles in steps of 5 degrees, the last bin from 90. A residual has rms / sqrt 2
+    // per axis: 41 bins over four of these to both sides, an odd number, so that 0 is the middle of a bin.
     f_.track_length = {2, 1, std::vector<std::int64_t>(14, 0)};
     f_.intersection_deg = {0, 5, std::vector<std::int64_t>(19, 0)};
     const double rms = f_.reprojection.rms_px > 0 ? f_.reprojection.rms_px : 1;
@@ -181,6 +183,7 @@ class Gatherer {
   }
 
   void observations() {
+    // Every step-th track of the block, counted over the batches, so that the sample does not depend on their size.
     const auto step = static_cast<std::size_t>(1 + tracks_.track_count() / kSampleLimit);
     std::vector<double> resolution;
     std::size_t before = 0;  // number of tracks in earlier batches
@@ -246,9 +249,11 @@ class Gatherer {
       if (static_cast<std::int64_t>(rays.size()) == kRayLimit) break;
       const ImageIndex image = batch.tracks.image[o];
       const Eigen::Vector3d ray = batch.points[row] - image_pose(result_, image).centre;
+      // Size of a pixel on the ground: the distance over the focal length in pixels, metres per pixel.
       resolution.push_back(ray.norm() / result_.state.cameras[block_.camera_of(image)][kFocal]);
       rays.push_back(ray.normalized());
     }
+    // The largest angle between two rays has the smallest cosine.
     double least = 1;
     for (std::size_t i = 0; i < rays.size(); ++i)
       for (std::size_t j = i + 1; j < rays.size(); ++j) least = std::min(least, rays[i].dot(rays[j]));
@@ -265,11 +270,15 @@ class Gatherer {
       residual.difference = control.adjusted - given.position;
       if (residual.images == 0) residual.difference.setConstant(kUnknown);  // it keeps its given position
       const bool check = given.role == PointRole::kCheck;
+      // The residual of an observation has the variance Q_l - Q_adjusted, because it took part. A check point did not,
+      // so both variances add.
       // The covariance of the result may be scaled; a variance that is subtracted from must have the same scale.
       const double factor = result_.sigma_scaled && !check ? result_.variance_factor : 1;
       for (int k = 0; k < 3; ++k) {
         const double given_variance = factor * given.sigma[k] * given.sigma[k];
         const double variance = given_variance + (check ? 1 : -1) * control.covariance(k, k);
+        // An adjusted variance that almost equals the given one means that the block does not check the point. Their
+        // difference would be rounding.
         if (variance > 1e-4 * given_variance) residual.sigma[k] = std::sqrt(variance);
         const double ratio = std::abs(residual.difference[k]) / residual.sigma[k];
         if (std::isfinite(ratio) && !(residual.ratio >= ratio)) residual.ratio = ratio;
@@ -324,6 +333,7 @@ class Gatherer {
                                                                 std::pair(batch.residual_y[o], batch.redundancy_y[o])};
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const auto [residual, stored] = axes[axis];
+      // 0 of 255 stands for less than 1/510: no other observation checks this one.
       if (stored == 0) {
         ++f_.reliability.unchecked;
         continue;
@@ -340,6 +350,8 @@ class Gatherer {
     if (batch.point_covariance.empty()) return;
     const Eigen::Matrix3d& c = batch.point_covariance[row];
     if (!c.allFinite()) return;
+    // The horizontal sigma of a point is the root of the sum of both variances (Helmert's point error), which does not
+    // depend on the axes.
     point_horizontal_.push_back(std::sqrt(std::max(0.0, c(0, 0) + c(1, 1))));
     point_up_.push_back(std::sqrt(std::max(0.0, c(2, 2))));
   }
@@ -386,6 +398,7 @@ bool oriented(const BlockResult& result, FrameIndex frame) {
 
 std::vector<ImageIndex> first_images(const BlockResult& result, std::size_t count, const ImageOrder& before,
                                      const std::function<void()>& after_reading) {
+  // O(n log count) time and memory for `count` images, where sorting all would need a list of them.
   std::vector<ImageIndex> first;  // a heap with the last of the selected images on top
   for (ImageIndex image(0); result.block.images.contains(image) && count > 0; ++image.value) {
     if (image.value % kImagesAtATime == 0) after_reading();

@@ -31,6 +31,7 @@ struct Histogram {
 struct Spread {
   double median = kUnknown, p95 = kUnknown, largest = kUnknown;
 };
+// Quantiles are values of the sample, without interpolation: the one at rank floor(share (n - 1)).
 Spread spread(std::vector<double> values);
 
 using megablock::ResidualField;
@@ -96,6 +97,9 @@ struct Reliability {
 struct NearLimit {
   static constexpr double kNear = 0.1;  // distance from the limit, as a share of it, to both sides
   std::int64_t tested = 0, near = 0;
+  // The length of a residual with normal x and y of sigma s exceeds k s with probability exp(-k^2 / 2) (Rayleigh). With
+  // the limit at k sigmas, the band holds exp(-(0.9 k)^2 / 2) - exp(-(1.1 k)^2 / 2). Residuals have less than the
+  // sigma of their observations, so this is an upper bound.
   double expected = 0;  // largest share of normally distributed errors with this sigma that lies there
   double share() const { return tested > 0 ? static_cast<double>(near) / static_cast<double>(tested) : 0; }
 };

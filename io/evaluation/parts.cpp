@@ -1,5 +1,9 @@
 // Finds the connected parts of a block. Two frames are connected if both have a kept observation of the same tie,
 // control or check point, or if there is a relative pose between them.
+//
+// The sets of frames are a union-find forest. The smaller index becomes the root, so the root of a part is its first
+// frame and the order of the joins does not matter. A track joins each of its frames to the previous one, which needs
+// one join per observation.
 #include "io/evaluation/parts.h"
 
 #include <algorithm>
@@ -91,6 +95,7 @@ void find_parts(const BlockResult& result, const TrackBatches& tracks, Figures& 
   for (const FreePart& part : result.free_parts) {
     if (!figures.part_of_frame.contains(part.frame) || figures.part_of_frame[part.frame] < 0) continue;
     int& defect = figures.parts[static_cast<std::size_t>(figures.part_of_frame[part.frame])].defect;
+    // If several free parts lie in one part, the worst counts.
     defect = std::max<int>(defect, part.defect);
   }
 }

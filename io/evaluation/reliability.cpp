@@ -29,6 +29,7 @@ double tau_critical_value(std::int64_t degrees_of_freedom, double probability) {
 }
 
 double probability_of_one(std::int64_t count, double probability) {
+  // 1 - (1 - p)^(1/n), without the cancellation for small p and large n.
   return -std::expm1(std::log1p(-probability) / static_cast<double>(std::max<std::int64_t>(1, count)));
 }
 
@@ -36,6 +37,8 @@ double probability_of_one(std::int64_t count, double probability) {
 // difference is 1e-13 here.
 double least_shift(double false_alarm, double detection) {
   const double bound = normal_critical_value(false_alarm);
+  // One tail alone gives bound + normal_quantile(1 - detection), which both tails can only lower. The probability grows
+  // with the shift, so bisection finds it.
   double low = 0, high = bound + normal_quantile(1 - detection) + 1;
   for (int i = 0; i < 200 && high - low > 1e-15 * high; ++i) {
     const double middle = 0.5 * (low + high);

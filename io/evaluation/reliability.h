@@ -7,6 +7,12 @@
 // adjustment, in any unit; under a robust loss it is that of the weighted observation, sigma / sqrt(rho'). No other
 // observation checks one with r < kLeastRedundancy; its normalised residual is then NaN, and its detectable error
 // infinite.
+//
+// Derivation. With the design matrix A and weights P, the residuals are v = -R e for errors e, where R = I - A (A'P
+// A)^-1 A'P and r = R_ii. For uncorrelated observations v has the variance sigma^2 r, and a gross error d of this
+// observation moves v by r d, so it moves w = |v| / (sigma sqrt(r)) by d sqrt(r) / sigma. The test sees it if this
+// shift reaches delta_0: d_0 = delta_0 sigma / sqrt(r). The part (1 - r) d_0 that the residual does not take goes into
+// the unknowns. Over the sigma of any function of them it is at most delta_0 sqrt((1 - r) / r).
 #pragma once
 
 #include <cstdint>

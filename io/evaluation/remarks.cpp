@@ -74,6 +74,8 @@ Placing placing_of(const BlockResult& result, const report::Figures& figures, st
 // The datum parameters that are undetermined. Several positions leave one rotation free only if they lie on a line
 // (merge/datum/gauge.h).
 std::string undetermined(int defect, const Placing& placing) {
+  // A similarity has seven parameters: three of place, three of direction, one of scale. Their number tells which of
+  // them are open only together with what was observed.
   if (defect >= 7) return "place, direction and scale";
   if (defect == 6) return "place and direction";
   if (defect == 4) return placing.positions == 0 && placing.attitudes > 0 ? "place and scale" : "direction and scale";
@@ -89,6 +91,7 @@ std::string axis_text(Eigen::Vector3d axis) {
   if (axis.z() < 0) axis = -axis;
   const double rise = std::asin(std::min(1.0, axis.z())) * kDegreesPerRadian;
   if (rise > 90 - kNear) return kAboutTheVertical;
+  // From north over east.
   double azimuth = std::atan2(axis.x(), axis.y()) * kDegreesPerRadian;
   if (rise >= kNear)
     return fmt::format(" about an axis {:.0f} degrees above azimuth {:.0f}", rise,
@@ -99,6 +102,8 @@ std::string axis_text(Eigen::Vector3d axis) {
 
 // The axis about which the rotations are least certain by far; empty if there is no such axis.
 std::string weak_axis(const BlockResult& result, const report::Figures& figures, std::int32_t part) {
+  // The rotation of a part as a whole is common to all its frames. In the sum of their covariances it stands out, and
+  // the errors of single frames average out.
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (FrameIndex f(0); result.frame_covariance.contains(f); ++f.value)
     if (figures.part_of_frame[f] == part) sum += result.frame_covariance[f].topLeftCorner<3, 3>();
@@ -215,6 +220,8 @@ std::string image_sigma_text(const BlockResult& result) {
   const std::string stated = option_of(result, "adjustment.image_sigma_px");
   const double factor = result.observation_table[ObservationKind::kTieImage].sigma_factor();
   const double assumed = std::strtod(stated.c_str(), nullptr);
+  // image_sigma_px was used in the adjustment; the factor says how the residuals compare with it. A smaller one is no
+  // weakness.
   const double shown = result.image_sigma_px * (factor > 1 ? factor : 1);
   if (!(assumed > 0 && shown > kMisstatedImage * assumed)) return "";
   const std::string placing = placing_text(result);
@@ -346,6 +353,7 @@ std::vector<std::string> contradicted_texts(const BlockResult& result, const rep
 std::string near_limit_text(const BlockResult& result, const report::Figures& figures) {
   constexpr double kMany = 2.5, kChance = 5;  // limits: times the expected number, and standard deviations above it
   const report::NearLimit& found = figures.near_limit;
+  // The number near the limit is about Poisson distributed: its standard deviation is the root of its mean.
   const double expected = found.expected * static_cast<double>(found.tested);
   const auto near = static_cast<double>(found.near);
   if (!(near > std::max(kMany * expected, expected + kChance * std::sqrt(expected + 1)))) return "";

@@ -47,7 +47,7 @@ std::vector<std::string> contradicted_texts(const BlockResult& result, const rep
 // Empty otherwise.
 std::string near_limit_text(const BlockResult& result, const report::Figures& figures);
 // The largest difference from one that the factor between shown and stated sigma has by chance: five standard
-// deviations.
+// deviations. The factor is sqrt(chi2 / r) with the redundancy r, and its standard deviation is about 1 / sqrt(2 r).
 double chance_of_factor(const ObservationStatistics& statistics);
 
 // All remarks of this file, one line each.
