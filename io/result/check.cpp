@@ -1,3 +1,6 @@
+// Three kinds of test, from the cheap to the thorough: the seal of a unit fits its bytes (JobStore::verified_path), its
+// contents have their format (the reader of its kind), and units fit each other (digest, index, tiles). An error in one
+// file does not end the check, so that one run lists everything that is damaged.
 #include "io/result/check.h"
 
 #include <algorithm>
@@ -67,6 +70,8 @@ class Check {
     std::vector<std::string> names;
     for (const std::string& name : store_.list("")) {
       const bool top = name.find('/') == std::string::npos;
+      // Logs, events and figures of the stages are text and have no seals; scratch and merge/parts belong to runs in
+      // progress.
       const bool text = name.starts_with("events/") || name.starts_with("log/") || name.starts_with("stages/") ||
                         name.starts_with("scratch/") || name.starts_with("merge/parts/") ||
                         (name.starts_with("result/") && name != kResult) ||

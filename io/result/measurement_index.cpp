@@ -17,6 +17,7 @@ namespace megablock {
 
 namespace {
 
+// A change of the algorithm changes the fingerprint, so that old indices are made anew.
 constexpr int kAlgorithm = 1;
 
 std::vector<ImageIndex> distinct_images(const TrackSet& tracks) {
@@ -45,6 +46,7 @@ void write_index(const std::string& path, const JobStore& store, const std::vect
   for (const auto& own : images)
     for (const ImageIndex image : own) ++begin[static_cast<std::size_t>(image.value) + 1];
   for (std::size_t i = 0; i < count; ++i) begin[i + 1] += begin[i];
+  // Counting sort. Tiles come in order, so those of an image ascend.
   std::vector<std::int64_t> next(begin.begin(), begin.end() - 1), tile_of_row(static_cast<std::size_t>(begin.back()));
   for (std::size_t t = 0; t < images.size(); ++t)
     for (const ImageIndex image : images[t])
@@ -121,6 +123,7 @@ std::vector<float> boxes_of(const std::vector<Eigen::Vector3d>& points) {
     for (std::size_t row = first; row < std::min<std::size_t>(points.size(), first + kPointRun); ++row) {
       if (!points[row].allFinite()) continue;
       const Eigen::Vector3f point = points[row].cast<float>();
+      // The conversion to float may round either way by half a unit. One unit more to each side bounds the double.
       const Eigen::Vector3f low = point.unaryExpr([](float v) { return std::nextafter(v, -kBeyond); });
       const Eigen::Vector3f high = point.unaryExpr([](float v) { return std::nextafter(v, kBeyond); });
       box.add(low.data(), high.data());

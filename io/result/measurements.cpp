@@ -1,3 +1,6 @@
+// A query for images reads the index by image, then the column of images in the track files of the tiles that it names.
+// A query for a place goes down three levels: districts (65536 points), runs (1024 points), points. Boxes bound the
+// points of the level below, so nothing is missed, and rows of the file are read only if their box touches the place.
 #include "io/result/measurements.h"
 
 #include <algorithm>
@@ -93,6 +96,7 @@ std::vector<std::int64_t> find_texts(const Hdf5Reader& file, const std::string& 
 
 // Distance of a box from a place: that of its nearest point. A point is a box without extent.
 double distance_from(const GroundPlace& place, const Eigen::Vector3d& lowest, const Eigen::Vector3d& highest) {
+  // The nearest point of the box is the place, clamped to the box.
   Eigen::Vector3d offset = (place.centre.cwiseMax(lowest).cwiseMin(highest)) - place.centre;
   if (std::isnan(place.centre.z())) offset.z() = 0;
   return offset.norm();

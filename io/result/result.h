@@ -111,6 +111,8 @@ struct BlockResult : TrackResults {
   std::vector<ControlResult> control;  // in block order
 
   // Figures, which `status --json` prints.
+  // chi2 = sum of squared weighted residuals, with the weights of the robust loss; variance_factor = chi2 /
+  // degrees_of_freedom, the square of sigma naught.
   double variance_factor = 1;  // a posteriori; = chi2_per_dof
   double chi2 = 0;
   std::int64_t degrees_of_freedom = 0;
@@ -143,10 +145,21 @@ BlockResult read_result_without_tracks(const std::string& path);
 std::string read_result_digest(const std::string& path);
 
 // Hash of the exact bits of all poses, cameras, points and kept observations in global order. It does not depend on the
-// layout of files, on the files of tiles, and on the number of ranks.
+// layout of files, on the files of tiles, and on the number of ranks. In this order enter
+//
+//   number of frames; per frame: whether it is oriented, then quaternion (w, x, y, z) and centre if it is
+//   number of cameras; the parameters of each in the order of its model
+//   number of rigs; per rig: number of mounts, pose of each
+//   number of tracks; per track, by ascending index: index, whether it has a position, position,
+//                     (image, x, y) of its kept observations
+//
+// Numbers before lists keep two different results from giving the same sequence. Everything else follows from these
+// numbers (residuals, covariances) or is a record (times, notes), so it does not enter. Equal digests therefore mean:
+// the same result, bit by bit.
 std::string result_digest(const BlockResult& result);
 
-// Mean and root mean square of the lengths of residuals, over the kept observations of triangulated points.
+// Mean and root mean square of the lengths of residuals (not per axis: for normal residuals the rms per axis is rms_px
+// / sqrt 2), over the kept observations of triangulated points.
 struct ReprojectionStatistics {
   std::int64_t oriented_images = 0, points = 0, observations = 0;
   double mean_px = 0, rms_px = 0, mean_track_length = 0;

@@ -1,4 +1,7 @@
 // Reads and writes result/block.h5 (docs/reference/file-formats.md, "Result").
+//
+// The digest is an attribute at the end, because it is complete only when all tracks have been written. Readers treat
+// groups that later programs added as optional, so older results stay readable.
 #include <algorithm>
 #include <utility>
 
@@ -94,6 +97,7 @@ void put_control_results(Hdf5Writer& file, const std::vector<BlockResult::Contro
               {"px", "adjusted minus measured, x, y; NaN: image not oriented"});
   std::vector<std::uint8_t> kept;
   for (const Result& result : control) kept.insert(kept.end(), result.kept.begin(), result.kept.end());
+  // Only if every point has verdicts; a part of them could not be assigned.
   if (2 * kept.size() == residuals.size())
     file.vector("control/measurement/kept", kept, {"", "1: kept, 0: takes no part"});
 }

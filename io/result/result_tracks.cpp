@@ -61,6 +61,7 @@ void ResultTrackWriter::append(const TrackResults& batch) {
   const TrackSet& tracks = batch.tracks;
   file_.append("points/id", plain(tracks.id));
   std::vector<std::int64_t> begin(tracks.begin.begin() + 1, tracks.begin.end());
+  // The offsets of a batch begin at 0, those of the file go on.
   for (std::int64_t& row : begin) row += observations_;
   observations_ += tracks.observation_count();
   file_.append("points/begin", begin);
@@ -124,6 +125,7 @@ TrackResults read_result_tracks(const Hdf5Reader& file, const RowRange& rows_of_
   const std::int64_t first = tracks.begin.front();
   for (std::int64_t& row : tracks.begin) row -= first;
   const std::int64_t total = file.shape("observations/image").front();
+  // Checks that the offsets ascend, before they are used.
   begin_of(file, "points/begin", counts_of(tracks.begin));
   if (first < 0 || first + tracks.begin.back() > total)
     file.fail("points/begin", "names rows that are not there: there are " + std::to_string(total) + " observations");
