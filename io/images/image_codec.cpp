@@ -24,6 +24,7 @@ ImageCodecs load_codecs() {
 }
 
 const ImageCodecs& codecs() {
+  // A static variable is initialised once, also with several threads.
   static const ImageCodecs loaded = load_codecs();
   return loaded;
 }

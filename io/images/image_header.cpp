@@ -40,6 +40,7 @@ class ExifFields {
     const auto* value = find(key);
     if (!value || n >= value->count()) return ImageHeader::kUnknown;
     const Exiv2::TypeId type = value->typeId();
+    // Exiv2 returns both kinds as signed numbers, so unsigned values above 2^31 are converted back.
     if (type == Exiv2::unsignedRational || type == Exiv2::signedRational) {
       const Exiv2::Rational r = value->toRational(n);
       const bool is_unsigned = type == Exiv2::unsignedRational;
@@ -117,6 +118,7 @@ double read_time(const ExifFields& exif) {
   double time = days * 86400 + hour * 3600 + minute * 60 + second;
   const std::string fraction = exif.text("Exif.Photo.SubSecTimeOriginal");
   double value = 0;
+  // The tag has the digits behind the decimal point: "05" are 50 ms.
   if (!fraction.empty() && std::sscanf(("0." + fraction).c_str(), "%lf", &value) == 1) time += value;
   return time;
 }
@@ -127,13 +129,14 @@ void read_lens(const ExifFields& exif, ImageHeader& header) {
   // The resolution refers to the original image. A reduced copy keeps the original size in PixelXDimension.
   const double resolution = exif.number("Exif.Photo.FocalPlaneXResolution");  // pixels per unit
   const double unit = exif.number("Exif.Photo.FocalPlaneResolutionUnit");
+  // EXIF codes: 2 inch (the default), 3 centimetre, 4 millimetre.
   const double unit_mm = unit == 3 ? 10 : unit == 4 ? 1 : 25.4;
   double pixels = exif.number("Exif.Photo.PixelXDimension");
   const double other = exif.number("Exif.Photo.PixelYDimension");
   if (std::isnan(pixels)) pixels = std::max(header.width, header.height);
   if (other > pixels) pixels = other;
   const double sensor = pixels / resolution * unit_mm;
-  // Otherwise a copy with tags that no longer fit together.
+  // Another value comes from a copy whose tags no longer fit together.
   if (sensor > 3 && sensor < 70) header.sensor_width_mm = sensor;
 }
 

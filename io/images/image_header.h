@@ -1,5 +1,15 @@
 // Reads the header of an image file (EXIF and XMP, by Exiv2): size, camera, time, GNSS position, attitude. The pixels
 // are neither decoded nor rotated; `orientation` is only reported.
+//
+// Units and references of the sources:
+//
+//     focal length   f_px = f_mm / width_mm * larger side: the width of the sensor counts along its larger side. With a
+//                    resolution of r pixels per unit it is pixels / r * (25.4 for inches, 10 for cm, 1 for mm).
+//     position       GPSLatitude and GPSLongitude are degrees, minutes, seconds without a sign, which is in the tags
+//                    ...Ref (S, W). GPSAltitudeRef 1 means a negative height. Heights count as ellipsoidal, WGS84.
+//     attitude       The angles of a gimbal in the XMP namespace drone-dji. They refer to north and to the vertical at
+//                    the image, as YawPitchRoll of geometry/transform/rotation.h.
+//     time           DateTimeOriginal has no time zone; it is taken as UTC.
 #pragma once
 
 #include <limits>

@@ -51,6 +51,7 @@ SensorTable read_table(std::string_view text) {
 std::optional<double> find_width(const SensorTable& table, const std::string& make, const std::string& model) {
   const auto [begin, end] = table.equal_range(model);
   for (auto entry = begin; entry != end; ++entry)
+    // Makers add words to their name ("NIKON CORPORATION"), so the name of the table need only be contained.
     if (make.find(entry->second.make) != std::string::npos) return entry->second.width_mm;
   return std::nullopt;
 }
