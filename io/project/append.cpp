@@ -136,6 +136,7 @@ Block append_to(const Block& previous, Block moved, const std::function<void()>&
   Block merged;
   merged.ground = moved.ground;
   merged.image_folder = moved.image_folder;  // the folder may have been moved since the job began
+  // From here each index of `now` goes through the table of its kind: cameras[old index] is the new one.
   const auto cameras = places_by_name(previous.cameras, moved.cameras, merged.cameras);
   const auto rigs = places_by_name(previous.rigs, moved.rigs, merged.rigs);
   const auto frames = places_by_name(previous.frames, moved.frames, merged.frames);

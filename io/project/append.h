@@ -1,5 +1,8 @@
 // Adds new images to the block of a job, without changing the indices of the old ones. The units of the job that refer
 // to these indices thus remain valid.
+//
+// The order matters because files of a job name images, frames and cameras by their index, not by their name. Appending
+// keeps all of them valid; a sorted merge would not.
 #pragma once
 
 #include <functional>

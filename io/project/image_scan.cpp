@@ -46,6 +46,8 @@ std::vector<std::string> image_names(const fs::path& folder, std::vector<std::st
 }  // namespace
 
 std::vector<ScannedImage> scan_images(const std::string& folder, Project& project) {
+  // The names are sorted before anything depends on their order, so indices do not depend on the file system. Threads
+  // write to their own rows, and copies are found afterwards in this order.
   const std::vector<std::string> names = image_names(folder, project.warnings);
   std::vector<ScannedImage> all(names.size());
   std::vector<std::string> failures(names.size());
@@ -104,6 +106,7 @@ Camera make_camera(const std::string& name, const ImageHeader& header) {
   camera.height = header.height;
   const auto focal = focal_px(header);
   camera.focal_known = focal.has_value();
+  // Without any information a normal lens: 1.2 times the larger side is a field of view of 45 degrees.
   camera.intrinsics[kFocal] = focal.value_or(1.2 * std::max(header.width, header.height));
   camera.intrinsics[kPrincipalX] = header.width / 2.0;
   camera.intrinsics[kPrincipalY] = header.height / 2.0;
@@ -142,6 +145,7 @@ std::string text_of(const Geodetic& p) {
 
 // Position in metres (east, north) relative to a reference. The approximation is good enough to find outliers.
 Eigen::Vector2d flat_metres(const Geodetic& p, const Geodetic& reference) {
+  // Along meridians and along the equator, to one per cent. std::remainder closes the circle at 180 degrees.
   constexpr double kMetresPerDegree = 111320;
   double east = std::remainder(p.longitude_deg - reference.longitude_deg, 360.0);
   east *= kMetresPerDegree * std::cos(reference.latitude_deg * 3.14159265358979 / 180);
@@ -187,6 +191,7 @@ std::vector<std::optional<Geodetic>> screen_positions(const std::vector<ScannedI
     else
       warnings.push_back("image '" + scanned[i].name + "': its GPS position " + reason + "; not used");
   }
+  // The median of two cannot tell which one is wrong.
   if (plausible.size() < 3) return result;
 
   std::vector<double> latitude, longitude, height;

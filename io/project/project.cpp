@@ -93,7 +93,10 @@ std::vector<std::string> names_left_out(const Project& project) {
   return names;
 }
 
-// Reads the keys that name files or change the block, in the order in which they depend on each other.
+// Reads the keys that name files or change the block, in the order in which they depend on each other: images make
+// cameras and frames; rigs join frames; a calibration needs cameras and mounts. Poses and control are read before the
+// positions, because they may give the origin, but are added after them: only then is the ground frame known. Attitudes
+// need the positions, for the vertical at each of them.
 void read_block_sections(YamlReader& top, Project& project, const std::optional<GroundFrame>& ground) {
   const auto images = top.existing_folder("images");
   const auto block_file = top.existing_file("block");

@@ -66,9 +66,11 @@ MountCalibration read_mount(YamlReader& reader, const std::string& name) {
   check_rotation_vector(turn, "rotation", reader.where("rotation"));
   check_on_vehicle(translation, "translation", reader.where("translation"));
   mount.pose.rotation = rotation_exp<double>(turn).normalized();
+  // The file has X_camera = R X_rig + t, as OpenSfM does, so the centre is -R' t.
   mount.pose.centre = -(mount.pose.rotation.conjugate() * translation);
   const double rotation = kDegree * reader.number("sigma_rotation_deg", {0, kSigmaDegrees.most}).value_or(0);
   const double position = reader.number("sigma_position_m", {0, kSigmaMetres.most}).value_or(0);
+  // Rotation first, then position, as in PoseIncrement.
   mount.covariance.diagonal() << Eigen::Vector3d::Constant(rotation * rotation),
       Eigen::Vector3d::Constant(position * position);
   reader.finish();

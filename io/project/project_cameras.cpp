@@ -67,6 +67,7 @@ void read_focal(YamlReader& reader, Camera& camera) {
   if (is_fixed(camera.intrinsics.model(), kFocal))
     throw InputError(reader.where(pixels ? "focal_px" : "focal_mm") +
                      ": the focal length of an equirectangular camera is its width / 2 pi; remove this key");
+  // sensor_mm is the length of the larger side, so the larger side in pixels belongs to it.
   camera.intrinsics[kFocal] = pixels ? *pixels : *millimetres / *sensor * std::max(camera.width, camera.height);
   if (millimetres) check_within(camera.intrinsics[kFocal], kFocalPx, "focal_mm in pixels", reader.where("focal_mm"));
   camera.focal_known = true;
@@ -152,6 +153,7 @@ CameraGrouping read_camera_grouping(YamlReader& cameras) {
 void read_cameras(YamlReader& cameras, Block& block) {
   const bool image_files = has_image_files(block);
   for (Camera& camera : block.cameras) {
+    // What the section of the camera says overrides the section of all cameras.
     if (auto reader = cameras.mapping("default")) read_camera(*reader, image_files, camera);
     if (auto reader = cameras.mapping(camera.name)) read_camera(*reader, image_files, camera);
     if (!camera.mask_path.empty()) check_mask(camera, cameras.where());

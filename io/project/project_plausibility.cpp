@@ -28,6 +28,7 @@ void warn_of_distant_poses(Project& project) {
     if (!frame.position_prior || !frame.given_pose) continue;
     const Eigen::Array3d sigma = frame.position_prior->sigma.array();  // large for an unknown height
     const Eigen::Array3d off = difference(*frame.given_pose, *frame.position_prior).array();
+    // A coordinate with a sigma of hundreds of metres says nothing; it does not count.
     distances.push_back((sigma < kFarOff_m).select(off, 0).matrix().norm());
     sigmas.push_back(sigma.minCoeff());
   }
@@ -56,6 +57,7 @@ void warn_of_distant_places(Project& project) {
   const Eigen::Vector3d images(median(x), median(y), median(z));
   double extent = kFar_m;
   for (std::size_t i = 0; i < x.size(); ++i)
+    // A tenth of the block's size, so that large blocks may have their origin outside.
     extent = std::max(extent, 0.1 * (Eigen::Vector3d(x[i], y[i], z[i]) - images).norm());
   const std::string remedy = "; check whether latitude and longitude are exchanged, and check the coordinate system";
   if (images.norm() > extent)

@@ -1,5 +1,16 @@
 // Sets the position and attitude priors of frames from the image headers (EXIF, XMP) and from the sections `gps`,
 // `attitude` and `origin` of the project file, and chooses the ground frame.
+//
+// Positions: EXIF gives latitude, longitude, height of the antenna. In the ground frame the adjustment uses
+//
+//     P = C + R' a,    C, R: pose of the frame, a: lever arm in axes of the rig (x right, y down, z ahead).
+//
+// Attitudes: a gimbal gives R_own, from the axes east, north, up at the image to those of the camera. With the rotation
+// own_from_block between the verticals of the two places and the mount R_m of the camera in its rig follows
+//
+//     R = R_m' R_own own_from_block,    in the axes of the ground frame.
+//
+// A kilometre from the origin the verticals differ by half a minute of arc, so this matters for large blocks.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -75,6 +86,7 @@ void set_position_priors(const std::vector<ScannedImage>& scanned,
     ImageHeader header = scanned[i].header;
     header.position = positions[i];
     Geodetic position = *positions[i];
+    // An unknown height gets that of the origin, and a sigma that leaves it free (position_sigma).
     if (!std::isfinite(position.height_m)) position.height_m = block.ground.height_m;
     PositionPrior prior;
     prior.position = georeference.to_local(position);
@@ -139,6 +151,7 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, c
   if (origin && !from_images)
     throw InputError(top.where("origin") +
                      ": 'origin' cannot be given with 'block', which has its own ground frame; remove it");
+  // The order of project_sections.h: the running job, `origin`, the images, other positions.
   if (ground && from_images)
     block.ground = *ground;
   else if (origin)
@@ -198,6 +211,7 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
     // therefore turned to the axes of the rig.
     const Eigen::Matrix3d r = prior.rotation_cw.toRotationMatrix();
     const Eigen::Vector3d variance(tilt * tilt, tilt * tilt, yaw * yaw);
+    // R D R' is the covariance in axes of the rig. Its correlations are dropped, because a prior has three sigmas.
     prior.sigma_rad = (r * variance.asDiagonal() * r.transpose()).diagonal().cwiseSqrt();
     frame.attitude_prior = prior;
   }

@@ -129,6 +129,7 @@ class RigBuilder {
     Block block = old_;
     block.rigs.clear();
     block.frames.clear();
+    // Without a held mount, a common motion of all mounts could be exchanged with the poses of the frames.
     const int reference = *std::min_element(used_.begin(), used_.end());
     block.rigs.push_back({"rig", {}});
     std::map<int, int> mount_of_camera;

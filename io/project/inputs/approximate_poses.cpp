@@ -116,6 +116,7 @@ class ToBlock {
     if (!reference_)
       throw InputError(row.where + ": poses in WGS84 need a georeferenced block; add 'origin' to the project file");
     try {
+      // The angles refer to the vertical at the position: R_own turns the axes there to those of the camera.
       return {(row.pose.rotation * reference_->own_from_block(row.position)).normalized(),
               reference_->to_local(row.position)};
     } catch (const InputError& error) {

@@ -11,6 +11,12 @@
 //   "WGS84 UTM 32N", "EPSG:25832", a PROJ string). The other lines are "x y z column row image [name ...]", separated
 //   by tabs or blanks (x = easting or longitude; z may be NaN). Lines with the same name, or without names but with the
 //   same coordinates, belong to one point. Columns and rows count from 0 at the centre of the first pixel; we add 0.5.
+//
+// In our pixels the centre of the first one is (0.5, 0.5), so the image spans [0, w] x [0, h]. The two other
+// conventions become
+//
+//     columns and rows from 0 at the first centre    (u, v) = (column, row) + (0.5, 0.5)
+//     normalised, origin in the middle of the image  (u, v) = max(w, h) (x, y) + (w, h) / 2
 #pragma once
 
 #include <string>

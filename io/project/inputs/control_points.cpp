@@ -65,6 +65,7 @@ class ToGround {
 
   Eigen::Vector3d operator()(const ControlTable::Point& point) const {
     Eigen::Vector3d xyz = point.coordinates;
+    // An unknown height starts at the origin's. Its sigma, kUnknownHeightSigma, leaves it free.
     if (std::isnan(xyz.z())) xyz.z() = crs_ ? ground_.height_m : 0;
     if (!crs_) return xyz;
     try {

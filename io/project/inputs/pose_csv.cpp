@@ -137,6 +137,7 @@ PoseTable pose_table(const Block& block, const BlockState& state) {
 
 void write_pose_csv(const std::string& path, const PoseTable& table) {
   std::ofstream stream(path);
+  // 17 significant digits give every double back.
   stream.precision(17);
   if (table.ground)
     stream << "# origin: " << table.ground->latitude_deg << ' ' << table.ground->longitude_deg << ' '

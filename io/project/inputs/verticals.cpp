@@ -49,6 +49,7 @@ double needed_sigma(const CsvTable& csv, std::size_t row, const char* column) {
 Eigen::Matrix3d covariance_of(const CsvTable& csv, std::size_t row, const Eigen::Vector3d& down) {
   if (csv.number(row, "sigma_deg")) {
     const double sigma = needed_sigma(csv, row, "sigma_deg");
+    // A unit vector has no error along itself: the covariance has rank two.
     return sigma * sigma * (Eigen::Matrix3d::Identity() - down * down.transpose());
   }
   const double roll = needed_sigma(csv, row, "sigma_roll_deg"), pitch = needed_sigma(csv, row, "sigma_pitch_deg");
@@ -61,6 +62,8 @@ Eigen::Matrix3d covariance_of(const CsvTable& csv, std::size_t row, const Eigen:
                      "and sigma_pitch_deg");
   Eigen::Matrix2d covariance;
   covariance << roll * roll, correlation * roll * pitch, correlation * roll * pitch, pitch * pitch;
+  // The derivatives of down = (sin r cos p, cos r cos p, -sin p) by roll r and pitch p, with level = cos p. C_down = J
+  // C J'.
   Eigen::Matrix<double, 3, 2> by_angles;
   by_angles << down.y(), down.x() * down.z() / level, -down.x(), down.y() * down.z() / level, 0, -level;
   return by_angles * covariance * by_angles.transpose();
@@ -156,6 +159,7 @@ AxisDirection whole_error(const SeenVertical& vertical, const Camera& camera, co
   AxisDirection down{vertical.down, vertical.covariance};
   for (Eigen::Index p = 0; p < vertical.camera.size(); ++p)
     down.direction += (values[static_cast<std::size_t>(p)] - vertical.camera[p]) * vertical.by_camera.col(p);
+  // C = C_measured + sum over parameters of d d' with d = sigma_p * derivative by p.
   const Eigen::Matrix3Xd of_camera = camera_error(vertical, camera);
   down.covariance += of_camera * of_camera.transpose();
   down.direction.normalize();
