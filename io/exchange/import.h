@@ -17,8 +17,8 @@ const std::vector<std::string>& import_formats();
 //
 // BAL and Bundler files have neither image sizes nor principal points. The image is taken as the smallest one that
 // contains all observations of the camera, with its centre as the principal point; principal point, k3, p1, p2 are
-// held. The COLMAP cameras SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV and FULL_OPENCV (k4 to k6 = 0) are
-// read; fx and fy must agree to 1e-9. Observations without a point are left out.
+// held. The COLMAP cameras that the table of camera models names are read (kColmap in geometry/camera/models/), of
+// FULL_OPENCV those with k4 to k6 = 0; fx and fy must agree to 1e-9. Observations without a point are left out.
 ImportedBlock import_block(const std::string& format, const std::string& path);
 
 // Writes a project that `megablock run` reads: folder/block.yaml, given.h5, tie_points.h5.

@@ -30,10 +30,12 @@ Pose pose_from_bal(const BalCamera& camera) {
 
 std::optional<Eigen::Vector2d> to_bal_image(const Intrinsics& k, const Eigen::Vector2d& pixel) {
   Eigen::Vector2d image(pixel.x() - k[kPrincipalX], k[kPrincipalY] - pixel.y());
+  // BAL's model is exactly this camera, so the pixel stays as it is.
   if (is_brown(k) && k[kRadial3] == 0 && k[kDecentring1] == 0 && k[kDecentring2] == 0) return image;
   if (k.model().kind == CameraModelKind::kPinhole) return image;
   const auto ray = unproject(k, pixel);
   if (!ray) return std::nullopt;
+  // p' = f (1 + k1 r^2 + k2 r^4) (X/Z, -Y/Z): what BAL's camera would have measured of this ray.
   const double r2 = ray->squaredNorm();
   const double scale = is_brown(k) ? k[kFocal] * (1 + r2 * (k[kRadial1] + r2 * k[kRadial2])) : k[kFocal];
   return Eigen::Vector2d(scale * ray->x(), -scale * ray->y());

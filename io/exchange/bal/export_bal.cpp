@@ -57,6 +57,7 @@ void export_bal(const BlockResult& result, const std::string& path) {
       writer.print("{} {} {} {}\n", all.image[k], t, all.position[k].x(), all.position[k].y());
   for (std::int64_t i = 0; i < view.image_count(); ++i) {
     const BalCamera camera = to_bal(view.pose(i), view.intrinsics(i));
+    // The rotation vector of R = S R_cw, world to camera.
     const Eigen::Vector3d w = rotation_log<double>(Eigen::Quaterniond(camera.rotation));
     const Eigen::Vector3d& t = camera.translation;
     for (const double v : {w.x(), w.y(), w.z(), t.x(), t.y(), t.z(), camera.focal, camera.k1, camera.k2})

@@ -24,6 +24,7 @@ Camera make_camera(const std::string& name, const BalCamera& bal, const Eigen::V
   camera.width = 2 * std::max(1, static_cast<int>(std::ceil(extent.x())));
   camera.height = 2 * std::max(1, static_cast<int>(std::ceil(extent.y())));
   camera.intrinsics = {bal.focal, camera.width / 2.0, camera.height / 2.0, bal.k1, bal.k2, 0, 0, 0};
+  // The principal point is the origin of the file's image coordinates and cannot be known better: it is held.
   camera.prior_sigma = {0.05 * bal.focal, 0, 0, 0.2, 0.2, 0, 0, 0};
   camera.focal_known = true;
   return camera;
@@ -67,6 +68,7 @@ ImportedBlock block_from_bal(const BalProblem& problem, const std::vector<std::s
         continue;  // of two observations in one image, the first counts
       const Camera& camera = block.cameras[CameraIndex(sorted[o].camera)];
       tracks.image.push_back(image);
+      // u = cx + x', v = cy - y': their y axis points up.
       tracks.x.push_back(to_fixed_pixel(camera.intrinsics[kPrincipalX] + sorted[o].position.x()));
       tracks.y.push_back(to_fixed_pixel(camera.intrinsics[kPrincipalY] - sorted[o].position.y()));
       tracks.feature.push_back(-1);

@@ -20,6 +20,8 @@ std::optional<int> parameter_here(const CameraModel& model, const std::string& n
   return find_parameter(model, name == "fx" || name == "fy" ? "f" : name);
 }
 
+// Whether the form has every parameter that is not zero. A zero one is implied: COLMAP's smaller models are ours with
+// some terms zero.
 bool holds(const ColmapCameraForm& form, const Intrinsics& k) {
   ParameterMask missing = 0;
   for (int p = 0; p < k.size(); ++p)

@@ -68,6 +68,7 @@ void write_model(const BlockResult& result, Writer& writer) {
     const std::int64_t end = view.begin[static_cast<std::size_t>(t) + 1];
     writer.point(point_id(view, t), view.point(t), point_error(view, t), end - begin);
     for (std::int64_t k = begin; k < end; ++k)
+      // POINT2D_IDX is the row of the observation in the list of its image, counted from 0.
       writer.track_element(image_id(view, view.image_of(view.observations[static_cast<std::size_t>(k)])),
                            by_image.rank[static_cast<std::size_t>(k)]);
     writer.end_point();

@@ -1,4 +1,8 @@
 // Builds a block from a COLMAP model, for the readers of text and binary files. Internal to io/.
+//
+// COLMAP's conventions are ours (export_colmap.h): X_cam = R X + t with x right, y down, z ahead, so the centre is C =
+// -R' t; pixel centres are at +0.5. The points come first, because an observation that names a missing point is an
+// error.
 #pragma once
 
 #include <functional>
@@ -11,7 +15,8 @@
 
 namespace megablock {
 
-// The camera model with this name in COLMAP. Calls `fail`, which throws, for a name that colmap_camera_forms() does not have.
+// The camera model with this name in COLMAP. Calls `fail`, which throws, for a name that colmap_camera_forms() does not
+// have.
 const ColmapCameraForm& colmap_camera_form(const std::string& name,
                                            const std::function<void(const std::string&)>& fail);
 

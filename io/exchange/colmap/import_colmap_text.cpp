@@ -1,4 +1,5 @@
-// Reads COLMAP models in text form.
+// Reads COLMAP models in text form. Each image has two lines: the pose, then its observations; the second one is empty
+// for an image without any. Track lists of points3D.txt repeat what the images say, and are not read.
 #include <charconv>
 #include <filesystem>
 

@@ -28,6 +28,7 @@ ExportView make_export_view(const BlockResult& result) {
     const std::size_t before = view.observations.size();
     for (std::int64_t o = tracks.begin[track]; o < tracks.begin[track + 1]; ++o)
       if (result.kept[static_cast<std::size_t>(o)] && view.image_of(o) >= 0) view.observations.push_back(o);
+    // One ray alone determines no point.
     if (view.observations.size() < before + 2) {
       view.observations.resize(before);
       continue;

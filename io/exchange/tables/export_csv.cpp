@@ -24,8 +24,9 @@ void print_angles(TextWriter& writer, const Eigen::Quaterniond& rotation) {
 }
 
 // The covariance of an image's rotation (about the ground axes) and projection centre, from that of its frame. The
-// projection centre is C + R' c, where c is the place of the camera in the rig; a rotation w of the frame moves it by
-// [R' c]x w. The covariance of the mount itself is not included.
+// projection centre is C + R' c, where c is the place of the camera in the rig. The increment w of the frame makes R
+// into R Exp(w), and R' c into Exp(-w) R' c = R' c - w x R' c, so it moves the centre by [R' c]x w. With J = (I 0; [R'
+// c]x I) the covariance is J C J'. The covariance of the mount itself is not included.
 BlockResult::Matrix6 image_covariance(const ExportView& view, std::int64_t i) {
   const FrameIndex frame = view.image(i).frame;
   BlockResult::Matrix6 move = BlockResult::Matrix6::Identity();
@@ -40,6 +41,7 @@ void print_sigmas(TextWriter& writer, const BlockResult::Matrix6& covariance, co
   const Eigen::Matrix3d r = to_axes.toRotationMatrix();
   const Eigen::Vector3d position = (r * covariance.bottomRightCorner<3, 3>() * r.transpose()).diagonal();
   for (const double variance : position) writer.print(",{:.6g}", std::sqrt(variance));
+  // The root mean square of the three axes: one number for all three angles, the same in every system of axes.
   writer.print(",{:.6g}", std::sqrt(covariance.topLeftCorner<3, 3>().diagonal().mean()) * kDegreesPerRadian);
 }
 
@@ -75,6 +77,7 @@ void write_wgs84(const ExportView& view, const std::string& path) {
     writer.print("{},{:.11f},{:.11f},{:.5f}", view.image_name(i), position.latitude_deg, position.longitude_deg,
                  position.height_m);
     const Eigen::Quaterniond own = georeference.own_from_block(position);
+    // R maps axes of the block's frame; R own' maps those of the place of the image.
     print_angles(writer, pose.rotation * own.conjugate());
     if (sigmas) print_sigmas(writer, image_covariance(view, i), own);
     writer.print("\n");

@@ -43,6 +43,7 @@ std::vector<Eigen::Vector3d> footprint(const Camera& camera, const Intrinsics& k
   for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(0, 0), {0, h}, {w, h}, {w, 0}}) {
     const auto ray = viewing_ray(k, pixel);
     if (!ray) return {};
+    // X = C + t R' ray. On the plane t = above / -direction.z, which exceeds 10 heights for |direction.z| < 0.1.
     const Eigen::Vector3d direction = pose.rotation.conjugate() * *ray;
     if (direction.z() > -0.1) return {};
     corners.push_back(pose.centre + direction * (above / -direction.z()));

@@ -9,15 +9,15 @@ namespace megablock {
 
 // Writes a folder with these files:
 //
-//   frames.csv        name,qw,qx,qy,qz,x,y,z,pass of each oriented frame (io/project/inputs/pose_csv.h, which reads
-//   back
-//                     the same bits)
+//   frames.csv        name,qw,qx,qy,qz,x,y,z,pass of each oriented frame; io/project/inputs/pose_csv.h reads back the
+//                     same bits
 //   images_local.csv  image,frame,camera,x_m,y_m,z_m,omega_deg,phi_deg,kappa_deg,yaw_deg,pitch_deg,roll_deg of each
 //                     oriented image in the block's ground frame, and the sigmas of its projection centre and rotation
 //                     if there are covariances
 //   images_wgs84.csv  image,latitude_deg,longitude_deg,height_m, and the angles and sigmas relative to the vertical at
 //                     the image (east, north, up at its position); only of georeferenced blocks
-//   cameras.csv       name,width,height,f,cx,cy,k1,k2,k3,p1,p2 and sigmas
+//   cameras.csv       name,width,height,model, the parameters of all models of the block, and their sigmas; cells of
+//                     parameters that a camera does not have are empty
 //   mounts.csv        rig,mount,camera,x_m,y_m,z_m,qw,qx,qy,qz (rig -> camera) and sigmas along and about the axes of
 //                     the rig; only of blocks with rigs of two or more cameras
 //
