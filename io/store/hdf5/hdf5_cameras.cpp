@@ -39,6 +39,7 @@ std::vector<CameraModel> get_models(const Hdf5Reader& file, std::int64_t rows) {
 void put_parameters(Hdf5Writer& file, const std::string& name, const std::vector<CameraModel>& models,
                     const std::vector<const double*>& values, const std::string& description) {
   const std::size_t columns = columns_of(models);
+  // Each row has the values of its model at the left, and NaN behind them.
   std::vector<double> matrix(models.size() * columns, kAbsent);
   for (std::size_t c = 0; c < models.size(); ++c)
     std::copy_n(values[c], count(models[c]), matrix.begin() + static_cast<std::ptrdiff_t>(c * columns));

@@ -1,9 +1,9 @@
 // Writer and reader of HDF5 files. All files that the project stores go through these two classes.
 //
 // Files are written with libver 'latest', without time stamps, and in a fixed order of calls; equal contents give equal
-// bytes. A file has one writer. HDF5's own file locking is off, because it fails on network file systems. Datasets of
-// integers and texts above 16 KiB are chunked, shuffled and deflated. Every file has the root attributes `kind` and
-// `format_version`.
+// bytes. The content hash of a unit therefore stands for its contents (job_store.h). A file has one writer. HDF5's own
+// file locking is off, because it fails on network file systems. Datasets of integers and texts above 16 KiB are
+// chunked, shuffled and deflated. Every file has the root attributes `kind` and `format_version`.
 //
 // Errors are StoreErrors that name file and dataset. A full disk, a quota or a read-only directory is an InputError
 // while writing. The classes are for one thread at a time.

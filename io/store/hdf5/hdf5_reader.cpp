@@ -122,6 +122,7 @@ void Hdf5Reader::check_class(std::int64_t set, const std::string& name, ElementT
   const bool wants_integers = type != ElementType::kFloat && type != ElementType::kDouble;
   const Hdf5Handle found(checked(H5Dget_type(set), name), &H5Tclose);
   const H5T_class_t kind = H5Tget_class(found.id());
+  // HDF5 would convert and cut off the decimals without a word.
   if (wants_integers && kind == H5T_FLOAT) fail(name, "holds floating-point numbers where integers are expected");
 }
 

@@ -69,8 +69,10 @@ std::string last_hdf5_failure() {
 
 Hdf5Handle file_access() {
   Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), &H5Pclose);
+  // One version of the format, so that the superblock has the layout that the writer relies on (kEndOfFile).
   H5Pset_libver_bounds(access.id(), H5F_LIBVER_LATEST, H5F_LIBVER_LATEST);
   H5Pset_file_locking(access.id(), false, true);
+  // H5Fclose then really closes the file, also if a dataset is still open.
   H5Pset_fclose_degree(access.id(), H5F_CLOSE_STRONG);
   return access;
 }

@@ -24,7 +24,8 @@ constexpr hsize_t kTextChunks = 16;           // number of chunks of text that a
 constexpr std::size_t kMemoryStep = 1 << 20;  // bytes by which the file in memory grows
 constexpr unsigned kDeflateLevel = 1;         // higher levels save a few per cent and take several times as long
 
-// Position in the superblock (version 2 or 3, 8-byte addresses) of the end of the file.
+// Position in the superblock (version 2 or 3, 8-byte addresses) of the end of the file: 8 bytes signature, 4 bytes
+// version, sizes and flags, then the addresses of base and extension, 8 bytes each.
 constexpr std::int64_t kEndOfFile = 28;
 
 Hdf5Handle without_times(hid_t property_class) {
@@ -163,6 +164,7 @@ void Hdf5Writer::reserve_disk(std::int64_t bytes) {
   hsize_t written = 0;
   if (file_.id() >= 0) H5Fget_filesize(file_.id(), &written);
   const auto open_chunks = static_cast<std::int64_t>((2 * growing_.size() + 2) * kChunkBytes);
+  // posix_fallocate fails with an error number where HDF5 would crash later.
   const std::int64_t needed = static_cast<std::int64_t>(written) + bytes + bytes / 8 + open_chunks;
   const Descriptor file(path_, O_WRONLY);
   if (file.id() < 0) throw_file_error(path_, "written", errno);

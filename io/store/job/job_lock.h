@@ -1,4 +1,8 @@
 // The lock of a job, which ensures that only one run at a time works on a job directory.
+//
+// The lock is flock on an open file and not the existence of the file: the kernel releases it when the process ends,
+// even by kill -9, so that no killed run leaves a job locked. The text inside is for people and for messages; nothing
+// is decided by it.
 #pragma once
 
 #include <optional>

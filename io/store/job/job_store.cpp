@@ -119,6 +119,8 @@ std::string process_start(const std::string& pid) {
 // Path of the temporary file: "<directory>/.<name>~<host>~<pid>~<start>.tmp".
 std::string temporary_path(const fs::path& target) {
   const std::string pid = std::to_string(::getpid());
+  // The name tells who writes it. Two processes never share a file, and a later run knows whether its writer still
+  // lives.
   std::string name = ".";
   for (const std::string& part : {target.filename().string(), host_name(), pid}) name += part + "~";
   name += process_start(pid) + kTemporarySuffix;
@@ -151,6 +153,7 @@ class Temporary {
   const std::string& path() const { return path_; }
   // Puts the file, which must be flushed, in place of the target.
   void rename() {
+    // POSIX: if the target exists, it is replaced in one step. Both are in one directory, so in one file system.
     if (::rename(path_.c_str(), target_.c_str()) != 0) throw_file_error(target_, "replaced", errno);
     done_ = true;
     flush_directory(fs::path(target_).parent_path().string());

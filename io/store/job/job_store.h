@@ -1,12 +1,25 @@
 // Reads and writes the job directory, which has one sealed file for each unit of work (docs/reference/file-formats.md).
 //
-// A unit is first written to a temporary file in its final directory. It is sealed by a trailer of 64 bytes (magic,
-// format version, payload length, XXH3 of the payload, fingerprint), flushed to the disk and renamed; then the
-// directory is flushed. A crash at any time therefore leaves either the old unit or the new one. HDF5 ignores bytes
-// after its own end of file, so every HDF5 reader can open a sealed unit.
+// A unit comes to its place in five steps. A process that is killed, or a machine that fails, loses at most the unit in
+// work:
 //
-// The fingerprint is the hash of everything that the unit was computed from. A unit is up to date when it exists, is
-// complete, and has the requested fingerprint.
+//     1  write the payload to a temporary file in the directory of the unit
+//     2  read it back, and append the seal: a trailer of 64 bytes with magic, format version, length and XXH3 of the
+//        payload, fingerprint and the trailer's own hash
+//     3  flush the file to the disk, before any name refers to it
+//     4  rename it: in one step, readers see either the old unit or the new one, and never a part
+//     5  flush the directory, so that write() returns only when the new name is on the disk
+//
+// Until step 4 the old unit is untouched. The temporary file of a killed run is deleted by the next one
+// (remove_temporaries()). The seal finds what the file system may still do wrong: truncated or damaged files count as
+// missing and are computed again. HDF5 ignores bytes after its own end of file, so every HDF5 reader can open a sealed
+// unit.
+//
+// The fingerprint is the hash of everything that the unit was computed from: the options, the version of the algorithm
+// and the content hashes of the units that were read. A unit is up to date when it exists, is complete, and has the
+// requested fingerprint. So a run does not need to know what an earlier one has done, and a changed option makes
+// exactly those units anew that depend on it. Content hashes, not times, stop the chain: if a unit is computed again
+// with the same bytes, the units after it stay up to date.
 #pragma once
 
 #include <cstdint>

@@ -252,6 +252,7 @@ std::string get_image_folder(const Hdf5Reader& file) {
   if (file.shape("images/name") == std::vector<std::int64_t>{0}) return "";
   const std::string path = file.text_rows("images/path", {{0, 1}}).front();
   const std::string name = file.text_rows("images/name", {{0, 1}}).front();
+  // Paths are folder + name, so only the folder need be kept in memory.
   return path.ends_with(name) ? path.substr(0, path.size() - name.size()) : "";
 }
 

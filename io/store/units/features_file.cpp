@@ -10,6 +10,7 @@ namespace megablock {
 
 namespace {
 
+// Of SIFT: 4 x 4 cells with 8 directions each. Global descriptors have as many numbers.
 constexpr std::int64_t kDescriptorSize = 128;
 
 void put_images(Hdf5Writer& file, const std::vector<ImageFeatures>& images) {

@@ -1,3 +1,6 @@
+// Lists of different lengths (measurements of points, of lines, parameters of verticals) are stored one after the
+// other, with a column of counts; begin_of() turns counts into offsets and checks them. A group is written only if the
+// block has such observations, so the files of other blocks stay as they are.
 #include "io/store/units/hdf5_block_observations.h"
 
 #include "io/block/frame_measurements.h"
@@ -170,6 +173,7 @@ void put_verticals(Hdf5Writer& file, const std::vector<SeenVertical>& verticals)
   std::vector<double> covariances, values, derivatives;
   for (const SeenVertical& v : verticals) {
     const Eigen::Matrix3d& c = v.covariance;
+    // The upper triangle by rows; the matrix is symmetric.
     covariances.insert(covariances.end(), {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)});
     values.insert(values.end(), v.camera.begin(), v.camera.end());
     derivatives.insert(derivatives.end(), v.by_camera.data(), v.by_camera.data() + v.by_camera.size());

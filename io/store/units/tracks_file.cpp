@@ -183,10 +183,12 @@ void TrackReader::visit(const std::function<void(const TrackSet&)>& take, const 
   std::int64_t row = 0, id = 0, previous_first = 0;
   TrackIndex last;
   for (std::int64_t first = 0; first < tracks;) {
+    // Tracks have two or more observations, so this many counts are enough for a batch. Fewer only make it smaller.
     const std::int64_t most = std::min(tracks - first, std::max<std::int64_t>(1, batch_observations / 2));
     std::vector<std::int64_t> counts = file_.rows<std::int64_t>(kCounts, {{first, most}});
     std::size_t taken = 0;
     std::int64_t sum = 0;
+    // A batch has at least one track, however long it is.
     for (; taken < counts.size() && (taken == 0 || sum + counts[taken] <= batch_observations); ++taken)
       sum += counts[taken];
     counts.resize(taken);
