@@ -130,6 +130,7 @@ std::vector<std::string> Report::remarks(const BlockResult& result) const {
 }
 
 std::string Report::html(BlockResult result, const ReportContext& context) && {
+  // The maps see the sample as if it were the tracks of the result.
   static_cast<TrackResults&>(result) = std::move(gathered_->drawn);
   std::string page = page_of(result, gathered_->figures, context);
   // The figures leave memory before the result is destroyed, because its destructor touches all frames once more.

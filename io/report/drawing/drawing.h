@@ -1,4 +1,8 @@
 // Draws the charts and maps of the report, as SVG text.
+//
+// Exaggeration: sigmas and residuals are far smaller than the things they belong to. They are drawn at the scale of the
+// map or sensor times a factor, which is 1, 2 or 5 times a power of ten so that readers can undo it; the caption states
+// it.
 #pragma once
 
 #include <string>

@@ -83,12 +83,14 @@ std::string significant(double value, int digits) {
     const std::string mantissa = signed_text(value / std::pow(10, power), std::max(0, digits - 1), false);
     return fmt::format("{}\u00b710<sup>{}{}</sup>", mantissa, power < 0 ? kMinus : "", std::abs(power));
   }
+  // A number of magnitude 10^power has power + 1 digits before the point.
   return signed_text(value, std::max(0, digits - 1 - power), false);
 }
 
 std::string percent(double part, double whole) {
   if (!(whole > 0) || !std::isfinite(part)) return kMissing;
   const double share = 100 * part / whole;
+  // A rounded 100 % would say that nothing is missing.
   if (part < whole && share > 99.9) return "99.9\u202f%";
   return fmt::format("{:.{}f}\u202f%", share, share == 0 || share == 100 ? 0 : 1);
 }

@@ -23,7 +23,8 @@ constexpr std::size_t kMostMarks = 200000;
 constexpr std::array<const char*, 10> kColours = {"#4e79a7", "#f28e2b", "#59a14f", "#b07aa1", "#76b7b2",
                                                   "#d4a017", "#e15759", "#9c755f", "#ff7f9f", "#7a8b99"};
 
-// Gives the tiles colours such that tiles with common tie points differ, as far as ten colours suffice.
+// Gives the tiles colours such that tiles with common tie points differ, as far as ten colours suffice: each tile in
+// turn takes the colour that the fewest of its coloured neighbours have.
 std::vector<std::size_t> tile_colours(const BlockResult& result, const std::function<void()>& after_reading) {
   std::vector<std::set<std::int64_t>> beside(static_cast<std::size_t>(result.tiles.tile_count));
   const auto tile_at = [&](std::int64_t o) {
@@ -80,6 +81,7 @@ class MapDrawing {
   }
 
  private:
+  // A line of no length with round ends: all dots of one colour are one path, which is far smaller than circles.
   static std::string dot(const Eigen::Vector2d& p) { return fmt::format("M{:.1f} {:.1f}h0", p.x(), p.y()); }
 
   bool here(std::size_t track) const {  // whether the tie point belongs to the selected frames

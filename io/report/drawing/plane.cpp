@@ -59,6 +59,7 @@ Plane plane_over(const std::vector<Eigen::Vector2d>& places) {
     plane.low = plane.low.cwiseMin(p);
     plane.high = plane.high.cwiseMax(p);
   }
+  // A single place has no extent; one millimetre keeps the scale finite.
   const Eigen::Vector2d size = (plane.high - plane.low).cwiseMax(1e-3);
   plane.height = std::clamp(2 * kMargin + (kMapWidth - 2 * kMargin) * size.y() / size.x(), kLeastHeight, kMostHeight);
   plane.scale = std::min((kMapWidth - 2 * kMargin) / size.x(), (plane.height - 2 * kMargin) / size.y());
@@ -108,8 +109,10 @@ std::string open_map(const Plane& plane, const std::string& label) {
 // Draws lines of round coordinates, with labels of east at the top and of north at the left.
 std::string coordinate_grid(const Plane& plane, const char* unit) {
   const Eigen::Vector2d middle = (plane.low + plane.high) / 2;
+  // Half of what the drawing shows, in metres; more than the extent of the block.
   const Eigen::Vector2d half = Eigen::Vector2d(kMapWidth, plane.height) / (2 * plane.scale);
   const double step = round_step(2 * half.maxCoeff(), kGridLines);
+  // 1e-9 keeps a step of 0.1 from becoming 0.0999..., which would get a second decimal.
   const int decimals = std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9)));
   const auto label = [&](double v) { return decimals > 0 ? fixed(v, decimals) : count(std::llround(v)); };
   std::string lines, texts;
@@ -129,6 +132,7 @@ std::string coordinate_grid(const Plane& plane, const char* unit) {
 }
 
 std::string scale_bar(const Plane& plane, const char* unit) {
+  // A round length of about a fifth of the block.
   const double length = round_step((plane.high - plane.low).maxCoeff() / 5, 1);
   const double drawn = length * plane.scale, y = plane.height + kMapFoot - 14;
   const bool kilometres = length >= 1000 && std::string(unit) == "m";

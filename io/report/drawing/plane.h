@@ -1,4 +1,12 @@
 // The plan view that the maps of the report share: its extent, its scale, and the places of frames in it.
+//
+// The drawing is a parallel projection along the vertical. With the middle (E0, N0) of the extent, the scale s and the
+// drawing of W = kMapWidth times H = `height` units,
+//
+//     x = W / 2 + s (E - E0),    y = H / 2 - s (N - N0),
+//
+// because the y axis of SVG points down. s is the largest scale at which the extent fits inside the margins; it is the
+// same for both axes, so that lengths and directions are right. H follows from the shape of the block, within limits.
 #pragma once
 
 #include <Eigen/Core>

@@ -78,6 +78,7 @@ std::string vertical_grid(const Axes& a, double factor) {
   return svg;
 }
 
+// The expected number per bin, n w phi(v / s) / s with n values, the bin width w and the normal density phi.
 std::string bell(const BarChart& chart, const Axes& axes) {
   const Histogram& h = chart.histogram;
   const double area = static_cast<double>(h.total()) * h.width;
@@ -113,6 +114,7 @@ std::string bin_labels(const BarChart& chart, const Axes& axes) {
 
 double round_step(double range, int parts) {
   if (!(range > 0) || !std::isfinite(range)) return 1;
+  // The smallest of 1, 2, 5, 10 times a power of ten that is at least range / parts. 1e-9 absorbs rounding.
   const double raw = range / parts;
   const double power = std::pow(10, std::floor(std::log10(raw)));
   for (double factor : {1.0, 2.0, 5.0})
@@ -237,11 +239,13 @@ FieldDrawing draw(const ResidualField& fine, const Camera& camera) {
       if (n < few) continue;
       const Eigen::Vector2d foot = foot_of(r, c);
       Eigen::Vector2d d = mean * scale * exaggeration;
+      // A longer arrow would hide its neighbours.
       const double allowed = std::min(1.5 * cell_width / d.norm(), room_in_frame(foot, d, {width, height}));
       if (allowed < 1) d *= allowed, ++cut;
       feet += fmt::format("M{:.1f} {:.1f}h0", foot.x(), foot.y());
       arrows += fmt::format("M{:.1f} {:.1f}l{:.1f} {:.1f}", foot.x(), foot.y(), d.x(), d.y());
     }
+  // The bar below the drawing shows a round number of pixels at the scale of the arrows.
   const double reference = round_step(cell_width / scale / exaggeration, 1);
   const double bar = reference * scale * exaggeration;
   FieldDrawing result;

@@ -1,4 +1,8 @@
 // Draws the maps of the coverage of the ground and of the precision of the frames.
+//
+// An error ellipse shows the covariance C of east and north: C u = lambda u gives the semi-axes sqrt(lambda_1) >=
+// sqrt(lambda_2), the sigmas along the directions u_1 and u_2. The true position lies inside with a probability of 1 -
+// exp(-1/2) = 39 %. The bar is the sigma of the height.
 #include <fmt/core.h>
 
 #include <Eigen/Eigenvalues>
@@ -34,6 +38,7 @@ std::size_t shade_of(std::int64_t images) {
 
 double cell_size(const BlockResult& result, const Plane& plane) {
   const double points = std::min(static_cast<double>(result.points.size()), static_cast<double>(kCoveragePoints));
+  // n points on W x H units: a cell of c x c has n c^2 / (W H) of them on average, if they are spread evenly.
   const double cell = std::sqrt(kMapWidth * plane.height * kPointsPerCell / std::max(1.0, points));
   const double longer = std::max(kMapWidth, plane.height);
   return std::clamp(cell, longer / kMostCells, longer / kLeastCells);
@@ -72,6 +77,7 @@ class Coverage {
   void gather(const BlockResult& result, const FrameSelection& selected, const std::function<void()>& after_reading) {
     if (result.kept.size() != result.tracks.image.size()) return;
     const std::size_t step = 1 + result.points.size() / kCoveragePoints;
+    // Pairs of cell and image as one number: sorted and made distinct, they count the images of each cell.
     std::vector<std::int64_t> seen;  // image + cell * images
     const auto images = std::ssize(result.block.images);
     seen.reserve(result.tracks.image.size() / step);
@@ -124,6 +130,7 @@ std::vector<Ellipse> ellipses_of(const BlockResult& result, const FrameSelection
     const Eigen::Vector2d major = axes.eigenvectors().col(1);
     all.push_back({plane.at(result.state.frames[f].centre.head<2>()), std::sqrt(std::max(0.0, axes.eigenvalues()[1])),
                    std::sqrt(std::max(0.0, axes.eigenvalues()[0])), std::sqrt(std::max(0.0, c(2, 2))),
+                   // y points down in the drawing, so angles change their sign.
                    -std::atan2(major.y(), major.x()) * 180 / std::numbers::pi, &result.block.frames[f].name});
   }
   return all;
@@ -172,7 +179,8 @@ FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& sele
   for (const Ellipse& e : all) sizes.push_back(std::max(e.major, e.up));
   const double typical = spread(sizes).p95;
   if (!(typical > 0)) return {};
-  // The 95 % quantile is drawn as long as half the distance between frames, but never longer than the margin.
+  // The 95 % quantile of the sigmas is drawn 0.3 of the mean distance between frames long, so that ellipses of
+  // neighbours, which are two sigmas long, do not overlap. It is never longer than the margin of the map.
   const double spacing = std::sqrt(kMapWidth * plane->height / static_cast<double>(all.size()));
   const double wanted = std::min(kMapWidth / 28, 0.3 * spacing) / (typical * plane->scale);
   const double exaggeration = step_below(wanted);

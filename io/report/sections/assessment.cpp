@@ -146,6 +146,8 @@ std::string points_item(const BlockResult& result, const Figures& f, PointRole r
 
 bool alarms(const SeamCheck& seam) { return seam.degrees > 0 && seam.statistic > seam.threshold; }
 
+// T is the squared difference of the two sides in the metric of its covariance. Its mean is the number of degrees of
+// freedom if the sides agree, so this root is then about 1.
 double sigmas_apart(const SeamCheck& seam) {
   return std::sqrt(std::max(0.0, seam.statistic) / static_cast<double>(seam.degrees));
 }

@@ -27,7 +27,9 @@ std::string with_digits(ParameterUnit unit, double value, std::string (*decimals
   return decimals(value, unit == ParameterUnit::kPixels ? 2 : 6);
 }
 
-// Angle between the rays through the middles of opposite borders, degrees.
+// Angle between the rays through the middles of opposite borders, degrees: 2 atan(half / f) for a plane image, half / f
+// on each side for a panorama (f = width / 2 pi); for others, their own rays. Distortion is left out where the image is
+// plane.
 double opening(const Camera& camera, const Intrinsics& k, const Eigen::Vector2d& half) {
   const Eigen::Vector2d centre(0.5 * camera.width, 0.5 * camera.height);
   if (is_panorama(k.model())) return 2 * half.norm() / k[kFocal] * kDegreesPerRadian;
@@ -55,6 +57,7 @@ std::string correlation_table(const BlockResult& result, CameraIndex index) {
   for (std::size_t i = 0; i < estimated.size(); ++i) {
     std::vector<std::string> cells = {parameter_name(model, estimated[i])};
     for (std::size_t j = 0; j <= i; ++j) {
+      // r_ij = C_ij / sqrt(C_ii C_jj).
       const double r =
           c(estimated[i], estimated[j]) / std::sqrt(c(estimated[i], estimated[i]) * c(estimated[j], estimated[j]));
       cells.push_back(i == j ? "1"
@@ -80,6 +83,7 @@ std::string camera_table(const BlockResult& result, CameraIndex index) {
     const double prior = camera.prior_sigma[at];
     const bool held = prior == 0 || sigma == 0;
     const double ratio = held ? kUnknown : std::abs(now - neutral(camera, k)) / sigma;
+    // A focal length has no neutral value to be tested against.
     const bool tested = k != kFocal && std::isfinite(ratio);
     table.add(
         {parameter_name(model, k) + (unit == ParameterUnit::kPixels ? " [px]" : ""), with_digits(unit, start, fixed),

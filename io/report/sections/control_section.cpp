@@ -37,6 +37,7 @@ void add_points(const BlockResult& result, const Figures& f, PointRole role, con
     if (point.role != role) continue;
     differences.push_back(r.difference);
     ratios.push_back(Eigen::Vector3d(r.difference.cwiseQuotient(r.sigma)));
+    // The mean of squares over all measurements, not over points.
     if (r.images) squares += r.rms_px * r.rms_px * r.images;
     images += r.images;
     if (static_cast<std::size_t>(++points) <= kListedPoints) add_point(point, r, unit, table);

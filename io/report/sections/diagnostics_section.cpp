@@ -150,6 +150,7 @@ class DiagnosticsMap {
       const Eigen::Vector2d a = plane_.at(d_.gaps[i].from), b = plane_.at(d_.gaps[i].to);
       Eigen::Vector2d way = b - a;
       way = way.isZero() ? Eigen::Vector2d(1, 0) : Eigen::Vector2d(way.normalized());
+      // Beside the line, perpendicular to it.
       Eigen::Vector2d p = (a + b) / 2 + 20 * Eigen::Vector2d(way.y(), -way.x());
       if (!plane_.shows(p)) p = (a + b) / 2;
       if (std::any_of(taken.begin(), taken.end(),
@@ -234,6 +235,7 @@ class DiagnosticsText {
     const Spread middle = spread(values);
     Histogram h;
     h.width = step_below(std::max(1e-3, 2 * middle.median) / 20);
+    // Twice the median, so that the typical values fill the left half, and further if the required limit lies near.
     const double top = std::max(2 * middle.median, std::min(d_.requested.max_base_to_height, 3 * middle.median));
     h.bins.assign(static_cast<std::size_t>(std::clamp(std::ceil(top / h.width), 8.0, 80.0)), 0);
     for (const double value : values) h.add(value);

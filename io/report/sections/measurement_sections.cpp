@@ -131,6 +131,7 @@ std::string attitudes_section(const BlockResult& result, const Figures& f) {
 std::string accuracy_section(const BlockResult& result, const Figures& f, const std::function<void()>& after_reading) {
   if (!std::isfinite(f.sigma_east.median) && !std::isfinite(f.point_sigma_horizontal.median)) return "";
   const double s0 = result.degrees_of_freedom > 0 ? std::sqrt(std::max(0.0, result.variance_factor)) : kUnknown;
+  // Covariances are for sigma naught = 1, unless the job has scaled them.
   const double scale = result.sigma_scaled ? 1 : s0;
   double most = 0;
   for (const Spread* s : {&f.sigma_east, &f.sigma_north, &f.sigma_up, &f.point_sigma_horizontal, &f.point_sigma_up})

@@ -24,6 +24,8 @@ bool misstated(const ObservationStatistics& statistics) {
 
 // Explains a surplus of large residuals, if there are more than chance explains (five standard deviations).
 std::string verdict(const Reliability& r) {
+  // The number beyond the limit is about Poisson distributed if the errors are normal: its standard deviation is the
+  // root of its mean.
   const double expected = kFalseAlarmProbability * static_cast<double>(r.tested);
   const auto found = static_cast<double>(r.beyond_normal);
   if (found <= expected + 5 * std::sqrt(std::max(1.0, expected)))
