@@ -19,7 +19,7 @@ double worst_axis(const Eigen::Matrix3d& covariance) {
   return std::sqrt(std::max(0.0, symmetric_eigen(covariance).values(2)));
 }
 
-// The mean over all directions, per axis.
+// The root mean square over all directions: one sigma per axis, as priors and the file have it.
 double mean_axis(const Eigen::Matrix3d& covariance) { return std::sqrt(std::max(0.0, covariance.trace() / 3)); }
 
 std::string quoted_name(const std::string& name) { return "\"" + name + "\""; }
@@ -48,6 +48,7 @@ std::string camera_yaml(const CameraCalibration& camera) {
 }
 
 std::string mount_yaml(const MountCalibration& m) {
+  // X_cam = R (X_rig - C) = R X_rig + t with t = -R C.
   const Eigen::Vector3d translation = -(m.pose.rotation * m.pose.centre);
   return fmt::format("  {}: {{rotation: {}, translation: {}, sigma_rotation_deg: {:.3g}, sigma_position_m: {:.3g}}}\n",
                      quoted_name(m.name), list_of(rotation_log<double>(m.pose.rotation)), list_of(translation),
@@ -70,6 +71,7 @@ void ImageFit::add(const ImageFit& other) {
 }
 
 double ImageFit::rms_px() const {
+  // Two coordinates per observation.
   return observations ? std::sqrt(squares / static_cast<double>(2 * observations)) : kUnknown;
 }
 
@@ -85,6 +87,7 @@ double MountCalibration::position_sigma_m() const { return worst_axis(covariance
 
 double expected_rms_px(const RigCalibration& calibration, double sigma_px) {
   if (calibration.residuals == 0 || !(calibration.redundancy > 0)) return kUnknown;
+  // A residual has the expected square sigma^2 r_i, and the r_i add up to the redundancy.
   return sigma_px * std::sqrt(calibration.redundancy / static_cast<double>(calibration.residuals));
 }
 

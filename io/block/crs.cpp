@@ -19,6 +19,7 @@ class ProjTransform {
  public:
   ProjTransform() : context_(proj_context_create()) {
     proj_log_level(context_, PJ_LOG_NONE);
+    // A grid that is fetched on one machine and missing on another would change heights without a word.
     proj_context_set_enable_network(context_, 0);
   }
   ~ProjTransform() {
@@ -58,6 +59,8 @@ double radians(double degrees) { return degrees * (std::numbers::pi / 180); }
 
 // Rotation from geocentric axes to east, north, up; the rows are these directions.
 Eigen::Matrix3d enu_from_geocentric(double latitude_deg, double longitude_deg) {
+  // With latitude p and longitude l: east = (-sin l, cos l, 0), up = (cos p cos l, cos p sin l, sin p), north = up x
+  // east.
   const double sp = std::sin(radians(latitude_deg)), cp = std::cos(radians(latitude_deg));
   const double sl = std::sin(radians(longitude_deg)), cl = std::cos(radians(longitude_deg));
   Eigen::Matrix3d m;
@@ -149,6 +152,8 @@ CrsToWgs84::CrsToWgs84(const std::string& crs) : crs_(crs), transform_(std::make
     throw InputError("coordinates in '" + crs +
                      "' cannot be transformed to WGS84: a grid (a geoid, say) that PROJ needs is not installed; "
                      "install it (package proj-data or cdn.proj.org) or give ellipsoidal heights");
+  // PROJ follows the axis order of each authority, which is often latitude first. Normalised, x is always east or
+  // longitude.
   PJ* normalised = proj_normalize_for_visualization(context, transform);
   proj_destroy(transform);
   transform_->set(normalised);

@@ -3,6 +3,10 @@
 // The local frame is topocentric (east, north, up; metres) about the origin of GroundFrame. It is a rotation and a
 // shift of geocentric coordinates and therefore exact at every distance. Every object has its own PROJ context: use an
 // object in one thread at a time, and one object for each thread.
+//
+// With geocentric coordinates G of a point and G_0 of the origin, and the matrix E_0 whose rows are east, north and up
+// at the origin, the local coordinates are E_0 (G - G_0). At another place E is another matrix: E E_0' turns directions
+// of the block's frame into the axes there (own_from_block).
 #pragma once
 
 #include <Eigen/Core>

@@ -1,3 +1,4 @@
+// The file is read as a whole and parsed in place by std::from_chars, which is exact and does not depend on the locale.
 #include "io/text/number_reader.h"
 
 #include <charconv>

@@ -69,6 +69,7 @@ bool parse_flag(const std::string& text, const std::string& what, const std::str
 
 std::string nearest_name(const std::string& name, const std::vector<std::string>& known) {
   std::string nearest;
+  // At most two changes, or a third of the letters: beyond that, a suggestion would be a guess.
   std::size_t best = std::max<std::size_t>(2, name.size() / 3) + 1;
   for (const std::string& candidate : known) {
     const std::size_t distance = edit_distance(name, candidate);

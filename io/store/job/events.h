@@ -1,8 +1,6 @@
 // Writes and reads the events of a job: one line of JSON for each unit that was finished or failed. Each run and rank
 // has its own file, events/<start>-<rank>.jsonl. Events are for the report and for people; the progress of the job
 // follows only from the unit files.
-//
-// Each run and rank has its own file, so that no two processes write to one file.
 #pragma once
 
 #include <cstdint>
