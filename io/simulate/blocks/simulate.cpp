@@ -186,12 +186,14 @@ CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layou
   const IntrinsicSigmas weak = weak_sigmas(truth, 0.01 * options.focal_px, options.image_width);
   const auto estimated = [&](int parameter) { return weak[static_cast<std::size_t>(parameter)] > 0; };
   if (options.calibrate) {
+    // Errors of up to 0.3 % of the focal length. Each parameter that the model fixes keeps its value.
     if (estimated(kFocal)) truth[kFocal] *= 1 + 0.003 * random.uniform(-1, 1);
     if (estimated(kPrincipalX)) truth[kPrincipalX] += 0.003 * options.focal_px * random.uniform(-1, 1);
     truth[kPrincipalY] += 0.003 * options.focal_px * random.uniform(-1, 1);
   }
   if (options.distortion && model != CameraModel()) {
     constexpr double kShare = 0.15;  // errors of the true camera, as a share of the weak prior sigmas
+    // The weak sigmas have the unit and size that each parameter needs, so one share serves all models.
     for (int p = kPrincipalY + 1; p < truth.size(); ++p)
       truth[p] += kShare * weak[static_cast<std::size_t>(p)] * random.uniform(-1, 1);
   } else if (options.distortion) {

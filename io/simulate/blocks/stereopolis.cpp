@@ -154,6 +154,7 @@ void add_drive(const SimulationOptions& options, const StereopolisScene& scene, 
   for (std::int64_t i = 0; i < frames; ++i) {
     const auto index = static_cast<std::uint64_t>(layout.block.frames.size());
     Random random(options.seed, Random::Purpose::kFrame, index);
+    // Frames are up to a tenth of their distance off.
     double s = options.frame_distance_m * (static_cast<double>(i) + random.uniform(-0.1, 0.1));
     // The same way from its end to its beginning, half a distance off, so that frames of two drives do not coincide.
     if (drive % 2 == 1) s = options.frame_distance_m * (static_cast<double>(frames) - 0.5) - s;
@@ -190,6 +191,7 @@ Layout make_stereopolis_layout(const SimulationOptions& options) {
   for (std::int64_t j = 0; j < streets; ++j)
     for (std::int64_t i = 0; i < streets; ++i) {
       const Eigen::Vector2d crossing = spacing * Eigen::Vector2d(static_cast<double>(i), static_cast<double>(j));
+      // Control points stand on the ground, and the crossing with the bridge has two levels.
       if (!bridge || crossing != bridge->centre()) layout.crossings.push_back(crossing);
     }
 

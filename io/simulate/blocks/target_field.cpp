@@ -91,6 +91,7 @@ void add_path(const SimulationOptions& options, Path path, std::int64_t pass, st
     const double s = way.length() * (static_cast<double>(i) + 0.5) / static_cast<double>(frames);
     const Eigen::Vector2d ahead = (way.at(s + 0.2) - way.at(s - 0.2)).normalized();
     Pose pose;
+    // A vehicle is never exactly on its path: 2 cm, and half a degree of tilt.
     pose.centre << way.at(s) + 0.02 * random.normal3().head<2>(), kRigHeight + 0.02 * random.normal();
     pose.rotation =
         rotation_update(level_rotation(ahead), kDegree * Eigen::Vector3d(0.5, 0.5, 1).cwiseProduct(random.normal3()));

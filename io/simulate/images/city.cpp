@@ -116,6 +116,8 @@ void City::add_box(const Eigen::Vector2d& low, const Eigen::Vector2d& high, doub
 }
 
 void City::build_town() {
+  // All lengths of the town are shares of the flying height, so that images look alike at any height. Two of three lots
+  // have a house.
   const double lot = 0.3 * options_.height_m;
   for (auto i = static_cast<std::int64_t>(std::floor(low_.x() / lot)); static_cast<double>(i) * lot < high_.x(); ++i)
     for (auto j = static_cast<std::int64_t>(std::floor(low_.y() / lot)); static_cast<double>(j) * lot < high_.y();
@@ -135,6 +137,8 @@ void City::build_town() {
 
 void City::build_streets() {
   const double spacing = options_.street_spacing_m;
+  // A house per kHouse metres on both sides of each street, 10 m deep, with the distance of facade_distance(): the same
+  // facades as those of the tie points.
   for (const int along : {0, 1}) {
     const int across = 1 - along;
     for (std::int64_t axis = nearest_axis(low_[across], spacing); axis <= nearest_axis(high_[across], spacing); ++axis)
@@ -165,6 +169,7 @@ void City::build_streets() {
 }
 
 void City::sort_boxes() {
+  // About one box per cell.
   cell_m_ = street_ ? kHouse : 0.3 * options_.height_m;
   columns_ = static_cast<std::int64_t>((high_.x() - low_.x()) / cell_m_) + 1;
   rows_ = static_cast<std::int64_t>((high_.y() - low_.y()) / cell_m_) + 1;
@@ -298,6 +303,7 @@ Eigen::Vector3f City::colour(const Hit& hit, const Eigen::Vector3d& direction, d
     detail = texture_.detail(p.x(), p.y(), surface, footprint);
   } else {
     const std::uint32_t number = surface * 4;
+    // Random numbers of the house, not of the place on it.
     const float tone = Texture::cell(0.5, 0.5, 1, number), hue = Texture::cell(1.5, 0.5, 1, number);
     base = Eigen::Vector3f(120 + 60 * tone, 105 + 50 * tone + 20 * hue, 90 + 60 * tone * hue + 20);
     if (hit.normal.z() > 0.5) {
@@ -339,6 +345,7 @@ std::optional<SurfacePoint> City::sample(const Pose& frame, Random& random) cons
   Eigen::Vector3d direction;
   if (street_) {
     const double azimuth = random.uniform(0, 2 * std::numbers::pi), slope = random.uniform(-0.6, 0.3);
+    // Streets are seen all around: from 31 degrees down to 17 degrees up.
     direction = Eigen::Vector3d(std::cos(azimuth), std::sin(azimuth), slope).normalized();
   } else {
     const auto ray =

@@ -1,6 +1,9 @@
 // Renders the Stereopolis vehicle in the images of its own cameras. Apart from the light it looks the same in all
 // images of a camera. The level cameras see the roof, a dome and a thin mast on it, and a scanner at the left side;
 // cameras that look up the facades do not see the vehicle.
+//
+// The parts are boxes in axes of the rig, so that the view depends on the mount alone and is made once per camera. Only
+// the light changes: the six faces of a box have six brightnesses, which the pose of the rig decides.
 #pragma once
 
 #include <array>

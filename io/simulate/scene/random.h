@@ -54,6 +54,7 @@ class Random {
     return radius * std::cos(2 * std::numbers::pi * uniform());
   }
   Eigen::Vector3d normal3() {
+    // One after the other: C++ does not fix the order in which the arguments of a call are evaluated.
     const double x = normal(), y = normal(), z = normal();
     return {x, y, z};
   }

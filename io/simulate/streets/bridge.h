@@ -4,6 +4,13 @@
 // along y and descends to the ground on both sides as a raised cosine. Walls stand on both sides; beside the opening
 // they reach down to the ground. Because of the walls, the bridge and the street below do not see each other within the
 // range of the street scene.
+//
+// With r = |x - centre.x|, the deck rises above the ground by
+//
+//     rise = kHeight                                                          for r <= kFlat,
+//     rise = kHeight / 2 (1 + cos(pi (r - kFlat) / (half_length - kFlat)))    up to half_length, then 0,
+//
+// which meets the road and the flat part without a kink.
 #pragma once
 
 #include <Eigen/Core>
