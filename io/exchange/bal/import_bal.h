@@ -1,4 +1,8 @@
 // Reads BAL and Bundler files (conventions: io/exchange/bal/bal_camera.h). Internal to io/.
+//
+// A BAL file is a sequence of numbers: cameras, points, observations; per observation camera, point, x, y; per camera
+// the rotation vector, t, f, k1, k2; per point x, y, z. A Bundler file has the cameras first, with R as nine numbers
+// row by row, and each point with its colour and its list of views (camera, key, x, y).
 #pragma once
 
 #include <string>

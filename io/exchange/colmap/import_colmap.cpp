@@ -48,6 +48,7 @@ void ColmapBuilder::add_image(std::int64_t id, const std::array<double, 4>& q, c
                               std::int64_t camera, const std::string& name) {
   const std::string which = "image " + std::to_string(id);
   const Eigen::Quaterniond rotation(q[0], q[1], q[2], q[3]);
+  // Written with few digits, a quaternion is not exactly a unit one.
   if (!(std::abs(rotation.norm() - 1) <= 1e-3)) fail("the rotation of " + which + " is not a unit quaternion");
   const auto found = cameras_.find(camera);
   if (found == cameras_.end())
@@ -57,6 +58,7 @@ void ColmapBuilder::add_image(std::int64_t id, const std::array<double, 4>& q, c
   Frame frame;
   frame.name = name;
   frame.rig = RigIndex(found->second.value);
+  // C = -R' t.
   frame.given_pose = Pose{rotation.normalized(), -(rotation.normalized().conjugate() * translation)};
   block.add_image(name, {block.frames.next_index(), 0, 0});
   block.frames.push_back(std::move(frame));

@@ -1,5 +1,11 @@
 // Reads binary COLMAP models. They are little-endian and have no padding. Counts have 64 bits, ids of cameras and
 // images 32 bits, and ids of points 64 bits.
+//
+//     cameras.bin   u64 count; each: u32 id, i32 model, u64 width, u64 height, f64 per parameter of the model
+//     images.bin    u64 count; each: u32 id, f64 qw qx qy qz tx ty tz, u32 camera, name with a zero byte,
+//                   u64 count; each: f64 x y, u64 point (all bits set: none)
+//     points3D.bin  u64 count; each: u64 id, f64 x y z, u8 r g b, f64 error,
+//                   u64 count; each: u32 image, u32 index in the list of this image
 #include <fmt/core.h>
 
 #include <algorithm>

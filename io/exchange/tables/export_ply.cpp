@@ -26,6 +26,7 @@ void export_ply(const BlockResult& result, const std::string& path) {
     writer.print("comment local frame, not georeferenced\n");
   writer.print("comment {} points (grey), then {} projection centres (red)\n", view.track_count(), view.image_count());
   writer.print("element vertex {}\n", view.track_count() + view.image_count());
+  // Coordinates may be kilometres with millimetres behind them: a float has too few digits.
   writer.print("property double x\nproperty double y\nproperty double z\n");
   writer.print("property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n");
   for (std::int64_t t = 0; t < view.track_count(); ++t) write_vertex(writer, view.point(t), 128, 128, 128);
