@@ -1,3 +1,6 @@
+// The tracks may be far larger than memory, so every figure is a sum or histogram over one loop, or comes from a sample
+// of every n-th track (medians, covariances). Sums per image, camera and tile are arrays of the size of these tables.
+// The loops run in the order of the result, so equal results give equal reports.
 #include "io/evaluation/figures.h"
 
 #include <algorithm>
@@ -57,13 +60,16 @@ struct Tests {
     ++sums.tested;
     sums.poorly_checked += test.redundancy < Reliability::kPoorRedundancy;
     sums.beyond_normal += test.normalised > normal_limit;
+    // tau uses sigma naught from the residuals in place of the stated sigma.
     sums.beyond_tau += tau_statistic(test.normalised, sigma_0) > tau_limit;
     const auto larger = [](const TestedMeasurement& a, const TestedMeasurement& b) {
       return a.normalised > b.normalised;
     };
+    // Counted above, but not listed.
     if (test.redundancy < Reliability::kListedRedundancy) return;
     auto& largest = sums.largest;
     if (largest.size() == kListed && !larger(test, largest.back())) return;
+    // Sorted insertion. Of equal values, the one that was found first stays in front.
     largest.insert(std::upper_bound(largest.begin(), largest.end(), test, larger), test);
     if (largest.size() > kListed) largest.pop_back();
   }
@@ -74,6 +80,7 @@ struct Tests {
 class LimitCounter {
  public:
   explicit LimitCounter(const BlockResult& result) {
+    // limit_px_ stays 0, and nothing is counted.
     if (result.free_parts.empty()) return;
     const double sigmas = std::strtod(option_of(result, "adjustment.max_residual_sigmas").c_str(), nullptr);
     limit_px_ = sigmas * result.image_sigma_px;
