@@ -1,4 +1,7 @@
 // Writes the figures of the report as JSON, for programs.
+//
+// Lengths are in metres, image coordinates in pixels, angles in radians unless the key ends in _deg; vectors are east,
+// north, up. Unknown numbers are null. A histogram has its lower limit, the width of a bin, and the counts.
 #pragma once
 
 #include <string>

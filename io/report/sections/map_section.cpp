@@ -34,6 +34,7 @@ std::vector<MapSubject> subjects_of(const Figures& f) {
   std::vector<MapSubject> subjects;
   bool any_placed = f.parts.empty();
   for (const BlockPart& part : f.parts) any_placed = any_placed || part.placed();
+  // Frames without a pose are on the first map too, at their GNSS positions.
   if (any_placed) subjects.push_back({placed, "m", true, -1});
   for (std::size_t p = 0; p < f.parts.size(); ++p)
     if (!f.parts[p].placed())
