@@ -23,6 +23,8 @@ struct ScannedImage {
 // project.copies and, like unreadable sub-folders, to project.warnings.
 std::vector<ScannedImage> scan_images(const std::string& folder, Project& project);
 
+// The images that share a camera: kExif by the name "<make> <model> <width>x<height> <focal>mm" (the make is not
+// repeated where the model begins with it), kFolder by folder and size, kOne by size.
 enum class CameraGrouping { kExif, kFolder, kOne };
 
 // Adds cameras, one rig per camera with the identity as its mount, and a frame and an image for each scanned image.

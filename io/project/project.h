@@ -1,5 +1,17 @@
 // Reads a project file (YAML, docs/reference/project-file.md) and the files that it names into a block and the options
 // of the stages.
+//
+// Where several sources tell the same thing, the strongest counts:
+//
+//     camera       `calibration`, then the section of the camera, then `cameras: default`, then the image headers,
+//                  then the guess of 1.2 times the larger side
+//     mounts       `calibration`, then the file of rig cameras
+//     mask         the key `mask` of the camera, then the folder `masks`
+//     position     of a rig, that of its first image with one. Its sigmas: `gps`, then the RTK values or
+//                  GPSHPositioningError of the header, then DOP or the default
+//     ground       that of the running job, then `origin`, then the median of the positions, of `poses`, of `control`
+//     given pose   the row of the frame, then that of its first image in the file
+//     control      the keys beside `control: file`, then the columns of the file, then the defaults
 #pragma once
 
 #include <functional>
