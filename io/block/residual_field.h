@@ -1,5 +1,8 @@
 // Collects the residuals of image observations in cells over the sensor of a camera. They show systematic errors of the
 // camera model, and the parts of the sensor that have observations.
+//
+// Random errors cancel in the mean of a cell: with n observations of sigma s it has the sigma s / sqrt(n). What remains
+// is systematic.
 #pragma once
 
 #include <Eigen/Core>
