@@ -1,5 +1,7 @@
 // Turns lists of items into the matrices of files and back: poses, vectors, indices. Only the readers and writers of
 // io/ use it.
+//
+// Absent vectors are rows of NaN, so that every column has one row per item.
 #pragma once
 
 #include <Eigen/Core>

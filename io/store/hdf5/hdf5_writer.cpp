@@ -200,6 +200,7 @@ void Hdf5Writer::texts(const std::string& name, const std::vector<std::string>& 
 
 void Hdf5Writer::texts(const std::string& name, std::int64_t count, const std::function<std::string(std::int64_t)>& row,
                        const DatasetNote& note) {
+  // Strings have a fixed length, so the longest must be known before the first is written: the first call of row().
   std::size_t length = 1;
   for (std::int64_t i = 0; i < count; ++i) length = std::max(length, row(i).size());
   const Hdf5Handle type = text_type(length), set = make_dataset(name, type.id(), {count});

@@ -3,6 +3,8 @@
 //
 // The writers make plain HDF5 files at `path`, which JobStore::write seals. The readers throw StoreError with the name
 // of the file.
+//
+// Values of frames that are not oriented are stored too; `oriented` tells that they mean nothing.
 #pragma once
 
 #include <string>
