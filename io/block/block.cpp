@@ -1,3 +1,5 @@
+// Every block passes check() before a stage sees it: from a project file, from an import or from the simulator. The
+// stages rely on what it tests, and do not test it again.
 #include "io/block/block.h"
 
 #include <algorithm>
@@ -93,6 +95,7 @@ void check_verticals(const Block& block) {
 }  // namespace
 
 bool same_origin(const GroundFrame& a, const GroundFrame& b) {
+  // Exactly: origins are copied, not computed.
   return a.latitude_deg == b.latitude_deg && a.longitude_deg == b.longitude_deg && a.height_m == b.height_m;
 }
 
@@ -113,6 +116,7 @@ void check(const Block& block) {
     require(std::all_of(camera.intrinsics.begin(), camera.intrinsics.end(), [](double v) { return std::isfinite(v); }),
             "camera '" + camera.name + "': a parameter is not a finite number");
     for (double sigma : camera.prior_sigma)
+      // Infinity is allowed and means a free parameter; the comparison also refuses NaN.
       require(sigma >= 0, "camera '" + camera.name + "': a prior sigma is negative or not a number");
   }
   for (const Rig& rig : block.rigs) {

@@ -104,6 +104,7 @@ namespace {
 
 void read_camera(YamlReader& reader, bool image_files, Camera& camera) {
   read_intrinsics(reader, camera);
+  // After the values, because the sigmas depend on the focal length and on whether it is known.
   camera.prior_sigma = default_intrinsic_sigmas(camera);
   if (const auto calibrate = reader.node("calibrate")) {
     const std::string where = reader.where("calibrate");

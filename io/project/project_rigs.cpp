@@ -171,6 +171,7 @@ class RigBuilder {
         }
         if (!places_.emplace(image->second, Place{e, camera}).second)
           fail("image '" + name + "' is assigned twice; keep one of the assignments");
+        // A mount belongs to one physical camera, so that its calibration is one set of unknowns.
         const auto [known, inserted] = camera_of_.emplace(camera, old_.camera_of(image->second));
         if (known->second != old_.camera_of(image->second))
           fail("rig camera '" + rig_camera + "' has images of two cameras ('" + old_.cameras[known->second].name +

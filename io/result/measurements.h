@@ -4,7 +4,8 @@
 //
 // For images, `measurements.h5` lists the tiles with observations in each image; the column of images in the track file
 // of a tile then gives the rows. For places, `points/district` and `points/box` of the result bound the adjusted
-// positions of runs of points. No observation is stored twice.
+// positions of runs of points. Points are in the order of the images that see them first, so those of a run lie close
+// together and their boxes are small. No observation is stored twice.
 //
 // Errors: InputError if the job has no tracks (no result, for places); StoreError if files are damaged, or older than
 // the files they were made from.

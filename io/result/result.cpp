@@ -49,6 +49,7 @@ void add_point(Hasher& hasher, const TrackResults& result, std::size_t row) {
     const auto i = static_cast<std::size_t>(o);
     if (result.kept[i]) observations.insert(observations.end(), {tracks.image[i].value, tracks.x[i], tracks.y[i]});
   }
+  // x and y are the fixed-point integers of the files, so the hash sees exactly what is stored.
   hasher.add(observations);
 }
 
@@ -89,6 +90,7 @@ void visit_sample(const TrackBatches& tracks, std::int64_t most,
   const std::int64_t step = 1 + (tracks.track_count() - 1) / most;
   std::int64_t before = 0;  // number of tracks in earlier batches
   tracks.visit([&](const TrackResults& batch) {
+    // The first row of this batch whose number in the whole result is a multiple of step.
     for (std::int64_t row = (step - before % step) % step; row < batch.tracks.track_count(); row += step)
       visit(batch, static_cast<std::size_t>(row));
     before += batch.tracks.track_count();

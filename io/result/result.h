@@ -137,6 +137,7 @@ struct BlockResult : TrackResults {
   std::string digest;              // see result_digest()
 };
 
+// Writers throw as Hdf5Writer does, and ComputeError for columns of different length. Readers throw StoreError.
 void write_result(const std::string& path, const BlockResult& result);
 // Writes a result with these tracks instead of its own, and sets its digest. `after_table` is called after every table
 // before and after the tracks is written.

@@ -36,6 +36,7 @@ std::vector<std::string> split(const std::string& line) {
 }  // namespace
 
 void refuse_semicolons(const std::string& header, const std::string& where) {
+  // Spreadsheets write semicolons where the comma is the decimal sign.
   if (header.find(',') == std::string::npos && header.find(';') != std::string::npos)
     throw InputError(where + ": semicolons between the columns; write commas there, and points in decimal numbers");
 }
@@ -66,6 +67,7 @@ CsvTable::CsvTable(const std::string& path) : path_(path) {
     if (fields.size() > columns_.size())
       throw InputError(place + ": " + std::to_string(fields.size()) + " fields, but the header has only " +
                        std::to_string(columns_.size()) + "; delete surplus fields, or put texts with commas in quotes");
+    // Fields that are missing at the end of a row are empty.
     fields.resize(columns_.size());
     rows_.push_back(std::move(fields));
     lines_.push_back(number);

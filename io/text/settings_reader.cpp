@@ -56,6 +56,7 @@ double parse_number(const std::string& text, const std::string& what, const std:
 std::int64_t parse_integer(const std::string& text, const std::string& what, const std::string& where) {
   std::int64_t value = 0;
   const std::string rest = parse_leading(text, value);
+  // "8.5" leaves ".5": a fraction is refused, not cut off.
   if (text.empty() || !rest.empty())
     throw InputError(where + ": " + what + ": " + in_apostrophes(text) + " is not a whole number");
   return value;

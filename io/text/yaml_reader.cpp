@@ -1,3 +1,5 @@
+// A key counts as known once a reader has asked for it, so finish() needs no list of keys that could go out of date. It
+// refuses all others: a misspelled key would otherwise be ignored without a word.
 #include "io/text/yaml_reader.h"
 
 #include <algorithm>
@@ -16,6 +18,7 @@ namespace fs = std::filesystem;
 namespace {
 
 std::string position(const std::string& file, const YAML::Mark& mark) {
+  // yaml-cpp counts lines from 0, people from 1.
   return file + ":" + std::to_string(mark.is_null() ? 1 : mark.line + 1);
 }
 
@@ -29,6 +32,7 @@ YamlReader::YamlReader(YAML::Node node, std::string file, std::string context)
   std::set<std::string> seen;
   for (const auto& item : node_) {
     if (!item.first.IsScalar()) throw InputError(position(file_, item.first.Mark()) + ": a key must be a plain word");
+    // yaml-cpp accepts repeated keys, of which only one would be used.
     if (!seen.insert(item.first.Scalar()).second)
       throw InputError(position(file_, item.first.Mark()) + ": key '" + item.first.Scalar() + "' appears twice in " +
                        name);
@@ -114,6 +118,7 @@ std::optional<YamlReader> YamlReader::mapping(const std::string& key) {
 
 std::string YamlReader::absolute(const std::string& path) const {
   const fs::path given(path);
+  // Relative to the project file, not to the present folder, so that a project can be run from anywhere.
   return (given.is_absolute() ? given : fs::absolute(file_).parent_path() / given).lexically_normal().string();
 }
 

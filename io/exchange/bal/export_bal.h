@@ -1,5 +1,7 @@
 // Writes BAL problems and Bundler files (conventions: io/exchange/bal/bal_camera.h). Only oriented images, points with
 // a position and kept observations are written. In these formats every image has its own camera.
+//
+// Throw InputError if a file cannot be written, and for fisheyes and panoramas (check_bal_model).
 #pragma once
 
 #include <string>

@@ -24,6 +24,7 @@ struct BalProblem {
   std::vector<BalObservation> observations;
 };
 
+// Throws InputError with file:line for malformed numbers and indices out of range.
 BalProblem read_bal(const std::string& path);
 
 // Makes one camera, rig, frame and image of each BAL camera. Without names, images are called image000000, ...

@@ -26,6 +26,8 @@ double point_error(const ExportView& view, std::int64_t t) {
   return sum / static_cast<double>(end - begin);
 }
 
+// Ids follow from the block, not from the rows of the export: they stay the same if other images or points are
+// exported.
 std::int64_t image_id(const ExportView& view, std::int64_t i) {
   return view.images[static_cast<std::size_t>(i)].value + 1;
 }

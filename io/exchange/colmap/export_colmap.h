@@ -13,6 +13,7 @@
 
 namespace megablock {
 
+// The folder must exist. Throw InputError if a file cannot be written, or a camera has a model that COLMAP lacks.
 void export_colmap_text(const BlockResult& result, const std::string& folder);
 void export_colmap_binary(const BlockResult& result, const std::string& folder);
 

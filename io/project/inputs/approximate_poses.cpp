@@ -23,6 +23,7 @@ constexpr double kGimbalDoubt = 20 * kDegree;  // a pitch so near to -90 is no a
 enum class Angles { kPhotogrammetric, kGimbal, kBody };
 
 Angles angles_of(const CsvTable& csv) {
+  // The names of the columns tell the convention; the numbers alone could not.
   if (csv.has("omega_deg")) return Angles::kPhotogrammetric;
   return csv.has("gimbal_pitch_deg") ? Angles::kGimbal : Angles::kBody;
 }
@@ -164,6 +165,7 @@ void set_given_poses(const ApproximatePoses& poses, const std::vector<std::strin
     images.emplace(block.name_of(ImageIndex(static_cast<std::int64_t>(i))), ImageIndex(static_cast<std::int64_t>(i)));
   std::set<FrameIndex> placed;  // frames with a pose from an earlier row; a pose that the block had is replaced
   for (const ApproximatePoses::Row& row : poses.rows) {
+    // A single image and its frame have the same name. Its mount is the identity, so both readings of the row agree.
     const auto image = images.find(row.name);
     const auto frame = frames.find(row.name);
     if (std::find(left_out.begin(), left_out.end(), row.name) != left_out.end()) {

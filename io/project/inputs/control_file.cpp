@@ -70,6 +70,7 @@ ControlTable read_gcp_list(std::istream& stream, const std::string& path) {
     if (fields.size() < 6)
       throw InputError(where + ": " + std::to_string(fields.size()) +
                        " fields in this line; expected x y z column row image [name]");
+    // Without a name, the text of the coordinates identifies the point: programs repeat it in each line.
     const std::string key = fields.size() > 6 ? fields[6] : fields[0] + " " + fields[1] + " " + fields[2];
     const Eigen::Vector3d coordinates(parse_number(fields[0], "x", where), parse_number(fields[1], "y", where),
                                       number_or_nan(fields[2], "z", where));

@@ -95,12 +95,14 @@ class CsvReader {
       if (columns_[c] >= fields.size()) fail(std::string("column '") + kColumns[c] + "' is missing in this line");
       const std::string& field = fields[columns_[c]];
       if (c == 0) continue;
+      // Exact, and the same in every locale.
       const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value[c]);
       if (error != std::errc() || end != field.data() + field.size() || !std::isfinite(value[c]))
         fail(std::string(kColumns[c]) + ": '" + field + "' is not a number; delete the line if the frame has no pose");
       if (c >= kFirstCoordinate) check_on_earth(value[c], kColumns[c], where());
     }
     Eigen::Quaterniond rotation(value[1], value[2], value[3], value[4]);
+    // Few digits make a quaternion a little longer or shorter. More than that is another convention, or angles.
     if (std::abs(rotation.norm() - 1) > 1e-3)
       fail("qw,qx,qy,qz is not a unit quaternion; its norm must be 1 to within 0.001");
     rotation.normalize();

@@ -104,6 +104,7 @@ class MapDrawing {
   std::string links() const {
     if (places_.size() > kSingleMarks) return "";
     std::map<std::pair<std::int64_t, std::int64_t>, std::int64_t> shared;
+    // A sample of the tracks shows every link of many tracks; single ones may be missing.
     const std::size_t step = 1 + result_.tracks.id.size() / 200000;
     for (std::size_t t = 0; t + 1 < result_.tracks.begin.size(); t += step)
       for (std::int64_t o = result_.tracks.begin[t] + 1; o < result_.tracks.begin[t + 1]; ++o) {

@@ -56,6 +56,7 @@ void add_pose(const BlockResult& result, ImageIndex image, std::vector<std::stri
 void add_sigmas(const BlockResult& result, FrameIndex frame, const LengthUnit& unit, std::vector<std::string>& cells) {
   const auto variance = result.frame_covariance[frame].diagonal().cwiseMax(0).eval();
   sigma_cells(variance.tail<3>().cwiseSqrt(), unit, cells);
+  // The largest of the three axes, as in the section on accuracy.
   cells.push_back(sigma_text(std::sqrt(variance.head<3>().maxCoeff()) * kDegreesPerRadian));
 }
 

@@ -28,6 +28,7 @@ std::vector<Eigen::Quaterniond> panorama_rotations(double horizontal_rad, double
                                                    double step = 0.4);
 
 // The vertices of an icosahedron that was subdivided `times` times: 10 * 4^times + 2 unit vectors.
+// Each division replaces a triangle by four, whose new corners are the middles of its edges, moved to the sphere.
 std::vector<Eigen::Vector3d> geodesic_sphere(int times);
 
 }  // namespace megablock

@@ -83,6 +83,7 @@ void write_images(const SimulationOptions& options, const Layout& layout, const 
     for (std::size_t i = 0; i < layout.block.images.size(); ++i) {
       const ImageIndex image(static_cast<std::int64_t>(i));
       if (layout.block.camera_of(image) != camera) continue;
+      // Sensor noise of its own for each image, the same however many images are rendered.
       const std::uint64_t seed = Random(options.seed, Random::Purpose::kImage, i).next();
       const Pose& rig = layout.truth.frames[layout.block.images[image].frame];
       const SeenVehicle seen{vehicle ? &*vehicle : nullptr, VehicleView::light_at(city, rig)};

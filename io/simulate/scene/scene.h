@@ -68,7 +68,7 @@ struct Layout {
   std::vector<Eigen::Vector2d> crossings;      // of streets with frames; zones of control may be there
 };
 
-// Makes the layout of options.scene.
+// Makes the layout of options.scene. The options must have passed check().
 Layout make_layout(const SimulationOptions& options);
 Layout make_aerial_layout(const SimulationOptions& options);
 Layout make_street_layout(const SimulationOptions& options);

@@ -73,6 +73,7 @@ Hdf5Reader::Hdf5Reader(const std::string& path) : path_(path) {
   file_ = Hdf5Handle(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id()), &H5Fclose);
   if (file_.id() < 0)
     throw StoreError(path + ": cannot be opened as HDF5 (" + last_hdf5_failure() + "); delete it and run again");
+  // The version is tested before anything is read, so an old file gives one clear message and not a missing dataset.
   if (!has_attribute("/", "kind") || !has_attribute("/", "format_version"))
     throw StoreError(path + ": is not a file of megablock (it lacks the attribute 'kind' or 'format_version')");
   const auto version = attribute<std::uint32_t>("/", "format_version");

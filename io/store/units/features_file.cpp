@@ -92,6 +92,7 @@ std::vector<ImageFeatures> read_features(const std::string& path) {
   std::vector<ImageFeatures> images = read_keypoints(path);
   const Hdf5Reader file(path, "features");
   std::int64_t rows = 0;
+  // Descriptors are most of the file; the readers that compare no images leave them out (read_keypoints).
   for (const ImageFeatures& features : images) rows += static_cast<std::int64_t>(features.keypoints.size());
   const auto descriptors = file.matrix<std::uint8_t>("keypoints/descriptor", kDescriptorSize, rows);
   const std::uint8_t* next = descriptors.data();

@@ -55,6 +55,7 @@ void write_registrations(const std::string& path, const std::vector<RegisteredPl
   write_poses(file, "registrations", value([](const Row& r) { return r.relative; }), "frame c", "frame a");
   std::vector<double> covariances;
   for (const RegisteredPlace& r : rows)
+    // Symmetric, so the order of rows and columns does not matter.
     covariances.insert(covariances.end(), r.registration.covariance.data(), r.registration.covariance.data() + 36);
   file.array("registrations/covariance", covariances, {static_cast<std::int64_t>(rows.size()), 6, 6},
              {"rad, m", "of Log(R R_estimated') and of the centre"});
