@@ -1,5 +1,5 @@
 // Every block passes check() before a stage sees it: from a project file, from an import or from the simulator. The
-// stages rely on what it tests, and do not test it again.
+// stages rely on what it tests.
 #include "io/block/block.h"
 
 #include <algorithm>

@@ -33,6 +33,7 @@ struct Match {
 class NormalisedError {
  public:
   void add(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance) {
+    // e'C^-1 e has the mean 3 in three dimensions, so a third of it has the mean 1.
     const Eigen::LLT<Eigen::Matrix3d> factor(covariance);
     if (factor.info() != Eigen::Success) return;
     sum_ += error.dot(factor.solve(error)) / 3;

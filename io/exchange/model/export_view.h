@@ -34,6 +34,7 @@ struct ExportView {
   std::int64_t track_count() const { return static_cast<std::int64_t>(tracks.size()); }
 };
 
+// The view refers to the result, which must outlive it.
 ExportView make_export_view(const BlockResult& result);
 
 // The observations of each image (ascending), as compressed sparse rows.

@@ -12,6 +12,7 @@ namespace megablock {
 
 namespace {
 
+// Ends of sigma s across a line of L pixels give its direction a sigma of sqrt(2) s / L: 8 degrees for 1 px and 10 px.
 constexpr double kShortestPx = 10;
 
 KnownLine::Direction direction_of(const std::string& text, const std::string& where) {

@@ -33,7 +33,7 @@ std::vector<Eigen::Quaterniond> panorama_rotations(double horizontal_rad, double
     const double angle = std::min(2 * std::numbers::pi / static_cast<double>(std::max<std::int64_t>(1, count)),
                                   step * horizontal_rad / std::cos(pitch));
     for (std::int64_t i = 0; i < count; ++i) {
-      // Rows begin a third of a turn apart, so that the seams of one row lie inside the images of the others.
+      // Rows begin a third of a step apart, so that the seams of one row lie inside the images of the others.
       const double yaw = angle * (static_cast<double>(i) + static_cast<double>(row) / kRows);
       const Eigen::Vector3d ahead(std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch), std::sin(pitch));
       const Eigen::Vector3d right(std::sin(yaw), -std::cos(yaw), 0);

@@ -49,6 +49,7 @@ Pose nominal_mount(const Placing& place) {
   const double yaw = kDegree * place.yaw_deg, pitch = kDegree * place.pitch_deg;
   // The rows of R are the axes of the camera in axes of the rig; down = ahead x right.
   const Eigen::Vector3d right(std::cos(yaw), 0, -std::sin(yaw));
+  // x right, y down, z ahead: a turn to the right moves z towards x, an upward pitch moves it towards -y.
   const Eigen::Vector3d ahead(std::sin(yaw) * std::cos(pitch), -std::sin(pitch), std::cos(yaw) * std::cos(pitch));
   Eigen::Matrix3d r;
   r << right.transpose(), ahead.cross(right).transpose(), ahead.transpose();

@@ -131,7 +131,8 @@ void simulate_control_zones(const SimulationOptions& options, const Observer& ob
 // scenes).
 void simulate_given(const SimulationOptions& options, SimulatedBlock& simulated);
 void simulate_priors(const SimulationOptions& options, SimulatedBlock& simulated);
-// Width of the margin of images without observations. The noise must not move an observation outside the image.
+// Width of the margin of images without observations. The noise must not move an observation outside the image: five
+// sigmas, and two pixels beside them.
 inline double image_margin(const SimulationOptions& options) { return 2 + 5 * options.image_noise_px; }
 // Simulates the relative pose of two frames with the sigmas and the noise of the options.
 RelativePose measure_relative(const SimulationOptions& options, const BlockState& truth, FrameIndex from, FrameIndex to,

@@ -115,8 +115,8 @@ PassErrors draw_pass_errors(const SimulationOptions& options, std::int64_t pass,
         draw_drift(length, options.drift_m * share, options.drift_per_frame_m, 2, {1, 1, kDriftHeight}, random);
     const auto turn = draw_drift(length, kDegree * kHeadingDrift_deg * random.uniform(2.0 / 3, 4.0 / 3), kAnySpeed, 3,
                                  {0.5, 1, 0.5}, random);
-    // A part of the stretch, at a random place in it, has no satellite at all.
-    // The share without satellites is one of all frames, and stretches have the share gnss_masked_share of them.
+    // A part of the stretch, at a random place in it, has no satellite at all. gnss_absent_share is a share of all
+    // frames; within masked stretches it is gnss_absent_share / gnss_masked_share.
     const double absent = static_cast<double>(length) * options.gnss_absent_share / options.gnss_masked_share;
     const double absent_from = random.uniform(0, static_cast<double>(length) - absent);
     for (std::int64_t i = 0; i < length; ++i) {

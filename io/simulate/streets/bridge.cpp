@@ -19,7 +19,7 @@ double Bridge::wall(double x) const { return kWall * std::min(1.0, rise(x) / 2);
 bool Bridge::upon(const Eigen::Vector3d& p) const { return carries(p.x(), p.y()) && p.z() > rise(p.x()) - 0.5 * kSlab; }
 
 bool Bridge::hides(const Eigen::Vector3d& eye, const Eigen::Vector3d& place) const {
-  // Both tests cut the straight line p(t) = eye + t (place - eye), 0 < t < 1, in heights above the ground.
+  // Both tests look at the straight line p(t) = eye + t (place - eye), 0 < t < 1, in heights above the ground.
   const Eigen::Vector3d sight = place - eye;
   const bool from = upon(eye), to = upon(place);
   // Intersect the line with the planes of the walls, y = centre +- kHalfWidth.

@@ -29,7 +29,6 @@ std::optional<SurfacePoint> StreetScene::sample(const Pose& frame, Random& rando
     point.position[across] = axis + side * random.uniform(3.5, kFacade - kFacadeDepth);
     point.normal.z() = 1;
   } else {
-    // A facade has no place where another street opens.
     if (off_axis(place, spacing_) < kFacade + kFacadeDepth) return std::nullopt;  // a crossing
     point.position[across] = axis + side * facade_distance(seed_, street_along_x, street, side, place);
     point.normal[across] = -side;

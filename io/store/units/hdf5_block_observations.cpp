@@ -1,6 +1,6 @@
 // Lists of different lengths (measurements of points, of lines, parameters of verticals) are stored one after the
-// other, with a column of counts; begin_of() turns counts into offsets and checks them. A group is written only if the
-// block has such observations, so the files of other blocks stay as they are.
+// other, with a column of counts; begin_of() turns counts into offsets and checks them. Lines, verticals and frame
+// measurements have a group only if the block has some, so the files of other blocks stay as they are.
 #include "io/store/units/hdf5_block_observations.h"
 
 #include "io/block/frame_measurements.h"
