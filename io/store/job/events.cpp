@@ -70,6 +70,7 @@ void read_file(const std::string& path, std::vector<UnitEvent>& events) {
   std::ifstream file(path);
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
+    // std::getline reaches the end of the file only if the last line has no line break.
     if (file.eof()) return;  // the line has no end: it was cut off
     try {
       events.push_back(from_json(Json::parse(line)));

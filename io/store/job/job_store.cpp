@@ -233,6 +233,7 @@ bool JobStore::is_current(const std::string& unit, std::uint64_t fingerprint, st
   damage.clear();
   if (!fs::exists(path(unit))) return false;
   const std::optional<UnitSeal> found = seal(unit);
+  // The trailer is read first, because it is cheap. The payload is read only if the unit would be used.
   if (found && found->fingerprint != fingerprint) return false;
   damage = problem(unit);
   return damage.empty();
@@ -310,6 +311,7 @@ void JobStore::remove_temporaries() const {
   for (fs::recursive_directory_iterator entry(directory_, error), end; !error && entry != end; entry.increment(error))
     if (entry->is_regular_file() && is_temporary(entry->path()) && !belongs_to_living_process(entry->path()))
       leftovers.push_back(entry->path());
+  // First all names, then the deletions: removing entries while a directory is read may skip others.
   for (const fs::path& leftover : leftovers)
     if (::unlink(leftover.c_str()) != 0 && errno != ENOENT) throw_file_error(leftover.string(), "removed", errno);
 }

@@ -10,6 +10,9 @@
 //     4  rename it: in one step, readers see either the old unit or the new one, and never a part
 //     5  flush the directory, so that write() returns only when the new name is on the disk
 //
+// A unit has one writer and is never changed in place, so units need no locks; the only lock is that of the job
+// (job_lock.h).
+//
 // Until step 4 the old unit is untouched. The temporary file of a killed run is deleted by the next one
 // (remove_temporaries()). The seal finds what the file system may still do wrong: truncated or damaged files count as
 // missing and are computed again. HDF5 ignores bytes after its own end of file, so every HDF5 reader can open a sealed
@@ -75,7 +78,8 @@ class JobStore {
 
   std::vector<std::string> list(const std::string& folder) const;  // the names of all units under a folder, sorted
   void remove(const std::string& unit) const;
-  // Deletes the temporary files of killed runs, but not those of a process that still runs on this host.
+  // Deletes the temporary files of killed runs, but not those of a process that still runs on this host. The caller
+  // must hold the lock of the job: then files of other hosts belong to no living run.
   void remove_temporaries() const;
 
  private:
