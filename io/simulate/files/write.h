@@ -1,4 +1,7 @@
 // Writes a simulated block without images: its tie points are given in a file.
+//
+// truth_tracks.h5 has the truth of tie_points.h5 row by row: the position of each track, and the Verdict of each
+// observation. The job never reads it.
 #pragma once
 
 #include <cstdint>
