@@ -148,8 +148,7 @@ void adjust_coarsely(const Block& block, const OrientationGraph& graph, const Co
   std::vector<double*> blocks;
   ceres.problem().GetParameterBlocks(&blocks);
   for (double* block_values : blocks)
-    solver.linear_solver_ordering->AddElementToGroup(block_values,
-                                                     ceres.problem().ParameterBlockSize(block_values) == 3 ? 0 : 1);
+    solver.linear_solver_ordering->AddElementToGroup(block_values, ceres.is_point(block_values) ? 0 : 1);
   solver.max_num_iterations = options.max_iterations;
   solver.function_tolerance = options.function_tolerance;
   solver.num_threads = 1;

@@ -123,6 +123,24 @@ TEST(Orientation, AerialBlockOverFlatGroundWithUnknownFocalLength) {
   }
 }
 
+// A pinhole has as many parameters as a point has coordinates. The adjustment must not take one for the other.
+TEST(Orientation, FindsTheFocalLengthOfAPinhole) {
+  SceneOptions options;
+  options.gps_sigma_m = 1;
+  options.focal_guess = 0.9;
+  SimulatedBlock scene = aerial(4, 7, options);
+  for (Camera& camera : scene.block.cameras) {
+    const Intrinsics brown = camera.intrinsics;
+    camera.intrinsics = Intrinsics(*find_model("pinhole"), {brown[kFocal], brown[kPrincipalX], brown[kPrincipalY]});
+    camera.prior_sigma = weak_sigmas(camera.intrinsics, 0.3 * brown[kFocal], camera.width);
+  }
+  scene.truth.cameras = initial_state(scene.block).cameras;
+  for (Intrinsics& camera : scene.truth.cameras) camera[kFocal] = options.focal_px;
+  const OrientationResult result = orient(scene, pairs_of(scene));
+  expect_oriented(scene, result, false, 4, 3);
+  EXPECT_NEAR(result.state.cameras[CameraIndex(0)][kFocal], options.focal_px, 0.05 * options.focal_px);
+}
+
 TEST(Orientation, SingleFlightLineLooksDown) {
   SceneOptions options;
   options.gps_sigma_m = 0.5;
