@@ -102,22 +102,39 @@ void read_intrinsics(YamlReader& reader, Camera& camera) {
 
 namespace {
 
-void read_camera(YamlReader& reader, bool image_files, Camera& camera) {
+void read_values(YamlReader& reader, bool image_files, Camera& camera) {
   read_intrinsics(reader, camera);
-  // After the values, because the sigmas depend on the focal length and on whether it is known.
-  camera.prior_sigma = default_intrinsic_sigmas(camera);
-  if (const auto calibrate = reader.node("calibrate")) {
-    const std::string where = reader.where("calibrate");
-    if (calibrate->IsSequence())
-      hold_except(*calibrate, where, camera);
-    else if (!*reader.flag("calibrate"))
-      camera.prior_sigma.fill(0);
-  }
   if (const auto mask = reader.existing_file("mask")) {
     if (!image_files) refuse_unused(reader, "mask", kNoImageFiles);
     camera.mask_path = *mask;
   }
-  reader.finish();
+}
+
+// Holds the parameters that `calibrate` does not free.
+void read_calibrate(YamlReader& reader, Camera& camera) {
+  const auto calibrate = reader.node("calibrate");
+  if (calibrate->IsSequence())
+    hold_except(*calibrate, reader.where("calibrate"), camera);
+  else if (!*reader.flag("calibrate"))
+    camera.prior_sigma.fill(0);
+}
+
+// What the section of the camera says overrides the section of all cameras.
+void read_camera(YamlReader& cameras, bool image_files, Camera& camera) {
+  auto common = cameras.mapping("default"), own = cameras.mapping(camera.name);
+  if (!common && !own) return;
+  if (common) read_values(*common, image_files, camera);
+  if (own) read_values(*own, image_files, camera);
+  // After the values, because the sigmas depend on the focal length and on whether it is known.
+  camera.prior_sigma = default_intrinsic_sigmas(camera);
+  const auto has_calibrate = [](auto& section) { return section && section->node("calibrate"); };
+  const bool for_all = has_calibrate(common), for_this = has_calibrate(own);  // asks both, so that both know the key
+  if (for_this)
+    read_calibrate(*own, camera);
+  else if (for_all)
+    read_calibrate(*common, camera);
+  if (common) common->finish();
+  if (own) own->finish();
 }
 
 std::string names_of(const Block& block) {
@@ -154,9 +171,7 @@ CameraGrouping read_camera_grouping(YamlReader& cameras) {
 void read_cameras(YamlReader& cameras, Block& block) {
   const bool image_files = has_image_files(block);
   for (Camera& camera : block.cameras) {
-    // What the section of the camera says overrides the section of all cameras.
-    if (auto reader = cameras.mapping("default")) read_camera(*reader, image_files, camera);
-    if (auto reader = cameras.mapping(camera.name)) read_camera(*reader, image_files, camera);
+    read_camera(cameras, image_files, camera);
     if (!camera.mask_path.empty()) check_mask(camera, cameras.where());
   }
   for (const std::string& key : cameras.keys())

@@ -221,6 +221,22 @@ TEST(Project, BadFilesAndCopiesAreLeftOut) {
   EXPECT_THAT(project.warnings, ElementsAre("image '9_copy.jpg' is a copy of '1.jpg'; left out"));
 }
 
+// What the section of a camera does not say, the section of all cameras does.
+TEST(Project, ASectionOfACameraKeepsWhatDefaultCalibrates) {
+  ScratchDirectory folder;
+  write_line(folder, 1);
+  const auto sigmas = [&](const std::string& common, const std::string& own) {
+    return read_text(folder, "images: images\ncameras:\n  default: {" + common +
+                                 "}\n  DJI FC300S 64x48 3.61mm: {focal_px: 100" + own + "}\n")
+        .block.cameras[CameraIndex(0)]
+        .prior_sigma;
+  };
+  EXPECT_THAT(sigmas("calibrate: false", ""), Each(0.0));
+  EXPECT_EQ(sigmas("calibrate: [focal]", ""), (IntrinsicSigmas{5}));
+  EXPECT_EQ(sigmas("calibrate: false", ", calibrate: [focal]"), (IntrinsicSigmas{5}));
+  EXPECT_EQ(sigmas("calibrate: [k1]", ", model: pinhole, calibrate: [focal]"), (IntrinsicSigmas{5}));
+}
+
 TEST(Project, CameraSettingsOverrideTheHeaders) {
   ScratchDirectory folder;
   write_line(folder, 1);
