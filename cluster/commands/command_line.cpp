@@ -19,6 +19,7 @@
 #include "cluster/commands/simulate_command.h"
 #include "cluster/commands/train_filter_command.h"
 #include "cluster/commands/verticals_command.h"
+#include "cluster/job/stage.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/mpi/communicator.h"
 #include "cluster/outcome/diagnostics.h"
@@ -27,7 +28,6 @@
 #include "cluster/process/exit_codes.h"
 #include "cluster/process/version.h"
 #include "cluster/stages/pipeline.h"
-#include "cluster/stages/stages.h"
 #include "cluster/status/status.h"
 #include "cluster/terminal/help_text.h"
 #include "cluster/terminal/option_checks.h"
@@ -86,10 +86,11 @@ void print_result(const RunOptions& options) {
   if (store.seal(kResult)) std::printf("report: %s\n", store.path(kReportPage).c_str());
 }
 
-void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::string& name, const std::string& stage,
+// `last`: the stage that the command ends with; nullptr: it runs all of them.
+void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::string& name, const Stage* last,
              const std::string& help) {
   auto options = std::make_shared<RunOptions>();
-  options->last_stage = stage;
+  if (last != nullptr) options->last_stage = name;
   CLI::App* command = app.add_subcommand(name, help);
   command->footer("Example: megablock " + name + " block.yaml -j job\n         mpirun --bind-to none -n 2 megablock " +
                   name + " block.yaml -j job");
@@ -124,7 +125,7 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
   add_log_level(*command, options->log.level);
   command->add_flag("-q,--quiet", options->quiet, "No progress");
   auto monolithic = std::make_shared<bool>(false);
-  if (stage == "merge")
+  if (last != nullptr && last->iterates)
     command->add_flag("--monolithic", *monolithic,
                       "Then compare with one monolithic adjustment of the same observations (JSON)");
   command->callback([=, &action, &ranks] {
@@ -178,6 +179,14 @@ void add_status(CLI::App& app, Action& action) {
   });
 }
 
+std::vector<StageFiles> files_of_stages() {
+  std::vector<StageFiles> files;
+  for (const Stage& stage : all_stages())
+    if (stage.kind != nullptr)
+      files.push_back({stage.kind, stage.read_file, stage.makes_file_by_tile() ? stage.folder() : ""});
+  return files;
+}
+
 void add_check(CLI::App& app, Action& action) {
   auto job = std::make_shared<std::string>();
   CLI::App* command = app.add_subcommand("check", "Verify every file of a job");
@@ -186,7 +195,7 @@ void add_check(CLI::App& app, Action& action) {
   command->callback([=, &action] {
     action = [job] {
       const JobStore store(*job);
-      std::vector<std::string> problems = check_job(store);
+      std::vector<std::string> problems = check_job(store, files_of_stages());
       if (std::filesystem::exists(store.path("job.json")))
         for (const std::string& line : unfinished_stages(store)) problems.push_back(*job + ": " + line);
       for (const std::string& problem : problems) std::printf("%s\n", problem.c_str());
@@ -423,9 +432,9 @@ int command_line(int argc, char** argv) {
     Action action;  // of all ranks together
     Action by_one;  // of a command that knows nothing of ranks; only the first rank runs it
     add_init(app, by_one);
-    add_run(app, action, ranks, "run", "", "Run all stages; the same command again resumes");
+    add_run(app, action, ranks, "run", nullptr, "Run all stages; the same command again resumes");
     for (const Stage& stage : all_stages())
-      if (stage.help != nullptr) add_run(app, action, ranks, stage.command, stage.command, stage.help);
+      if (stage.help != nullptr) add_run(app, action, ranks, stage.command, &stage, stage.help);
     add_calibrate(app, action, ranks);
     add_masks(app, by_one);
     add_verticals(app, by_one);

@@ -12,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "cluster/job/stage.h"
 #include "cluster/process/exit_codes.h"
 #include "cluster/terminal/option_checks.h"
 #include "cluster/terminal/output_check.h"
@@ -204,7 +205,7 @@ std::string page(const std::vector<Proposal>& proposals) {
 
 int propose_masks(MasksOptions options) {
   options.regions.check();
-  const Project project = read_project(options.project);
+  const Project project = read_project(options.project, settings_sections());
   const Block& block = project.block;
   if (!has_image_files(block))
     throw InputError(options.project +

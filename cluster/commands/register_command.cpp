@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "adjust/registration/frame_resection.h"
+#include "cluster/job/stage.h"
 #include "cluster/process/exit_codes.h"
 #include "cluster/stages/pipeline.h"
 #include "cluster/terminal/option_checks.h"
@@ -34,7 +35,7 @@ std::vector<Pose> starts_of(const Block& block, const TrajectoryOptions& options
 int resect(const ResectOptions& options) {
   options.resection.check();
   check_output(options.output, inputs_of(options.project));
-  const Project project = read_project(options.project);
+  const Project project = read_project(options.project, settings_sections());
   const Block& block = project.block;
   if (std::none_of(block.control_points.begin(), block.control_points.end(), [](const ControlPoint& point) {
         return point.role == PointRole::kControl && !point.measurements.empty();

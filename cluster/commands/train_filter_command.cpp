@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "cluster/job/given_tracks.h"
+#include "cluster/job/stage.h"
 #include "cluster/process/exit_codes.h"
 #include "cluster/terminal/option_checks.h"
 #include "cluster/terminal/output_check.h"
@@ -60,7 +61,7 @@ void print_table(const std::vector<LabelledMatch>& matches, const TrainFilterOpt
 }
 
 int train(const TrainFilterOptions& options) {
-  const Project project = read_project(options.project);
+  const Project project = read_project(options.project, settings_sections());
   if (project.tie_points.empty())
     throw InputError(options.project +
                      ": no 'tie_points'; the filter is trained on given tracks, as 'megablock simulate' writes them");

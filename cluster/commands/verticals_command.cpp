@@ -11,6 +11,7 @@
 #include <opencv2/core.hpp>
 
 #include "cluster/commands/found_verticals.h"
+#include "cluster/job/stage.h"
 #include "cluster/process/exit_codes.h"
 #include "cluster/stages/common/block_hash.h"
 #include "cluster/terminal/option_checks.h"
@@ -166,7 +167,7 @@ std::vector<FoundVertical> look_at_images(const Block& block, const SegmentOptio
 
 int write_verticals(VerticalsOptions options) {
   options.segments.check();
-  const Project project = read_project(options.project);
+  const Project project = read_project(options.project, settings_sections());
   const Block& block = project.block;
   namespace fs = std::filesystem;
   if (!has_image_files(block))

@@ -1,11 +1,11 @@
-// Describes each option struct once, for both the project file and the fingerprints, so that no option can be read
-// without being hashed.
 
 #include "cluster/job/job_options.h"
 
 #include <cctype>
+#include <sstream>
 
 #include "cluster/job/job_json.h"
+#include "cluster/job/stage.h"
 #include "io/base/error.h"
 #include "io/text/plausible.h"
 #include "io/text/settings_reader.h"
@@ -14,16 +14,14 @@ namespace megablock {
 
 namespace {
 
-template <typename Visitor>
-void describe(Visitor& visit, FeatureOptions& o) {
+void describe(OptionVisitor& visit, FeatureOptions& o) {
   visit.integer("max_features", o.max_features);
   visit.number("max_megapixels", o.max_megapixels);
   visit.number("contrast_threshold", o.contrast_threshold);
   visit.flag("root_sift", o.root_sift);
 }
 
-template <typename Visitor>
-void describe(Visitor& visit, CandidateOptions& o) {
+void describe(OptionVisitor& visit, CandidateOptions& o) {
   visit.integer("neighbours", o.neighbours);
   visit.number("max_pair_distance_m", o.max_pair_distance_m);
   visit.number("max_view_angle_deg", o.max_view_angle_deg);
@@ -33,8 +31,7 @@ void describe(Visitor& visit, CandidateOptions& o) {
   visit.integer("cell_pairs", o.cell_pairs);
 }
 
-template <typename Visitor>
-void describe(Visitor& visit, MatchOptions& o) {
+void describe(OptionVisitor& visit, MatchOptions& o) {
   visit.integer("k_best", o.k_best);
   visit.number("ratio", o.ratio);
   visit.number("max_residual_px", o.max_residual_px);
@@ -52,30 +49,26 @@ void describe(Visitor& visit, MatchOptions& o) {
   visit.number("trajectory_rotation_sigma_deg", o.trust.rotation_sigma_deg);
 }
 
-template <typename Visitor>
-void describe(Visitor& visit, TrackOptions& o) {
+void describe(OptionVisitor& visit, TrackOptions& o) {
   visit.integer("min_track_length", o.min_length);
   visit.flag("remove_eccentricity", o.remove_eccentricity);
 }
 
-template <typename Visitor>
-void describe(Visitor& visit, TileOptions& o) {
+void describe(OptionVisitor& visit, TileOptions& o) {
   visit.integer("tile_max_frames", o.tile_max_frames);
   visit.integer("min_tiles", o.min_tiles);
   visit.integer("min_tiles_from", o.min_tiles_from);
   visit.integer("weak_link_tracks", o.weak_link_tracks);
 }
 
-template <typename Visitor>
-void describe_loss(Visitor& visit, const std::string& name, RobustLoss& loss) {
+void describe_loss(OptionVisitor& visit, const std::string& name, RobustLoss& loss) {
   int kind = static_cast<int>(loss.kind);
   visit.choice(name, {"none", "huber", "cauchy", "cauchy_tail"}, kind);
   loss.kind = static_cast<RobustLoss::Kind>(kind);
   visit.number(name + "_scale", loss.scale);
 }
 
-template <typename Visitor>
-void describe(Visitor& visit, ObservationOptions& o) {
+void describe(OptionVisitor& visit, ObservationOptions& o) {
   visit.number("image_sigma_px", o.image_sigma_px);
   describe_loss(visit, "image_loss", o.image_loss);
   describe_loss(visit, "position_loss", o.position_loss);
@@ -87,22 +80,19 @@ void describe(Visitor& visit, ObservationOptions& o) {
   visit.flag("use_attitude_priors", o.use_attitude_priors);
 }
 
-template <typename Visitor>
-void describe(Visitor& visit, OrientationOptions& o) {
+void describe(OptionVisitor& visit, OrientationOptions& o) {
   visit.number("max_rotation_error_deg", o.max_rotation_error_deg);
   visit.integer("min_points_per_image", o.min_points_per_image);
   visit.integer("tracks_per_pair", o.tracks_per_pair);
   visit.integer("part_frames", o.part_frames);
 }
 
-template <typename Visitor>
-void describe(Visitor& visit, EnvironmentOptions& o) {
+void describe(OptionVisitor& visit, EnvironmentOptions& o) {
   visit.flag("refraction", o.refraction);
   visit.flag("earth_curvature", o.earth_curvature);
 }
 
-template <typename Visitor>
-void describe(Visitor& visit, AdjustOptions& o) {
+void describe(OptionVisitor& visit, AdjustOptions& o) {
   describe(visit, o.observations);
   visit.flag("estimate_image_sigma", o.estimate_image_sigma);
   visit.number("min_intersection_deg", o.min_intersection_deg);
@@ -111,8 +101,7 @@ void describe(Visitor& visit, AdjustOptions& o) {
   visit.integer("max_iterations", o.max_iterations);
 }
 
-template <typename Visitor>
-void describe(Visitor& visit, DiagnosticsOptions& o) {
+void describe(OptionVisitor& visit, DiagnosticsOptions& o) {
   visit.number("min_base_to_height", o.min_base_to_height);
   visit.number("max_base_to_height", o.max_base_to_height);
   visit.number("min_overlap", o.min_overlap);
@@ -121,8 +110,7 @@ void describe(Visitor& visit, DiagnosticsOptions& o) {
   visit.number("gap_factor", o.gap_factor);
 }
 
-template <typename Visitor>
-void describe(Visitor& visit, MergeSettings& o) {
+void describe(OptionVisitor& visit, MergeSettings& o) {
   visit.integer("max_iterations", o.max_iterations);
   visit.number("decrement", o.decrement);
   visit.integer("screening_rounds", o.screening_rounds);
@@ -130,54 +118,70 @@ void describe(Visitor& visit, MergeSettings& o) {
   visit.flag("scale_sigma", o.scale_sigma);
 }
 
-// The sections of the project file and the options that each sets, in the order of the docs.
-template <typename JobOptionsOrConst, typename Function>
-void for_each_section(JobOptionsOrConst& o, Function&& function) {
-  function("features", o.features);
-  function("candidates", o.candidates);
-  function("matching", o.matching, o.tracks);
-  function("tiles", o.tiles);
-  function("orientation", o.orientation);
-  function("environment", o.environment);
-  function("adjustment", o.adjustment);
-  function("merge", o.merge);
-  function("diagnostics", o.diagnostics);
+// The section that sets these members.
+template <auto... members>
+constexpr OptionSection section(const char* name, const char* file_key = nullptr) {
+  return {name, file_key,
+          [](OptionVisitor& visitor, JobOptions& options) { (describe(visitor, options.*members), ...); },
+          [](const JobOptions& options) { ((options.*members).check(), ...); }};
 }
 
-// Adds every described value to a hash.
-class HashVisitor {
+// Visitor that sets every described value that the project file has.
+class ReadingVisitor final : public OptionVisitor {
+ public:
+  ReadingVisitor(const StageSettings& settings, const char* section) : reader_(settings, section) {}
+  void number(const std::string& key, double& value) override { reader_.number(key, value); }
+  void integer(const std::string& key, int& value) override { reader_.integer(key, value); }
+  void integer(const std::string& key, std::int64_t& value) override { reader_.integer(key, value); }
+  void flag(const std::string& key, bool& value) override { reader_.flag(key, value); }
+  void text(const std::string& key, std::string& value) override { reader_.text(key, value); }
+  void choice(const std::string& key, const std::vector<std::string>& names, int& value) override {
+    reader_.choice(key, names, value);
+  }
+  void finish() const { reader_.finish(); }
+
+ private:
+  SettingsReader reader_;
+};
+
+// Visitor that feeds every described value to a hash.
+class HashVisitor final : public OptionVisitor {
  public:
   explicit HashVisitor(Hasher& hasher) : hasher_(hasher) {}
-  void number(const std::string& key, double value) { hasher_.add(key).add(value); }
-  void integer(const std::string& key, std::int64_t value) { hasher_.add(key).add(value); }
-  void flag(const std::string& key, bool value) { hasher_.add(key).add(value); }
-  void choice(const std::string& key, const std::vector<std::string>&, int value) { hasher_.add(key).add(value); }
-  void text(const std::string& key, const std::string& value) { hasher_.add(key).add(value); }
+  void number(const std::string& key, double& value) override { hasher_.add(key).add(value); }
+  void integer(const std::string& key, int& value) override { hasher_.add(key).add(std::int64_t{value}); }
+  void integer(const std::string& key, std::int64_t& value) override { hasher_.add(key).add(value); }
+  void flag(const std::string& key, bool& value) override { hasher_.add(key).add(value); }
+  void text(const std::string& key, std::string& value) override { hasher_.add(key).add(value); }
+  void choice(const std::string& key, const std::vector<std::string>&, int& value) override {
+    hasher_.add(key).add(value);
+  }
 
  private:
   Hasher& hasher_;
 };
 
 // Writes every described value as text.
-class TextVisitor {
+class TextVisitor final : public OptionVisitor {
  public:
   TextVisitor(std::string section, std::vector<OptionValue>& values) : section_(std::move(section)), values_(values) {}
-  void number(const std::string& key, double value) {
+  void number(const std::string& key, double& value) override {
     std::ostringstream text;
     text.imbue(std::locale::classic());
     text << value;
-    values_.push_back({section_, key, text.str()});
+    add(key, text.str());
   }
-  void integer(const std::string& key, std::int64_t value) {
-    values_.push_back({section_, key, std::to_string(value)});
+  void integer(const std::string& key, int& value) override { add(key, std::to_string(value)); }
+  void integer(const std::string& key, std::int64_t& value) override { add(key, std::to_string(value)); }
+  void flag(const std::string& key, bool& value) override { add(key, value ? "true" : "false"); }
+  void text(const std::string& key, std::string& value) override { add(key, value); }
+  void choice(const std::string& key, const std::vector<std::string>& names, int& value) override {
+    add(key, names[static_cast<std::size_t>(value)]);
   }
-  void flag(const std::string& key, bool value) { values_.push_back({section_, key, value ? "true" : "false"}); }
-  void choice(const std::string& key, const std::vector<std::string>& names, int value) {
-    values_.push_back({section_, key, names[static_cast<std::size_t>(value)]});
-  }
-  void text(const std::string& key, const std::string& value) { values_.push_back({section_, key, value}); }
 
  private:
+  void add(const std::string& key, const std::string& value) { values_.push_back({section_, key, value}); }
+
   std::string section_;
   std::vector<OptionValue>& values_;
 };
@@ -194,15 +198,14 @@ bool names_key(const std::string& message, const std::string& key) {
 }
 
 // Checks options whose values do not depend on others. The error names the place where the project file sets the value.
-template <typename Options>
-void check_section(const StageSettings& settings, const std::string& section, const Options& options) {
+void check_section(const StageSettings& settings, const OptionSection& section, const JobOptions& options) {
   try {
-    options.check();
+    section.check(options);
   } catch (const InputError& error) {
     const std::string message = error.what();
     for (const auto& entry : settings.entries)
-      if (entry.section == section && names_key(message, entry.key))
-        throw InputError(entry.where + ": " + section + ": " + message +
+      if (entry.section == section.name && names_key(message, entry.key))
+        throw InputError(entry.where + ": " + section.name + ": " + message +
                          (message.find(", not ") == std::string::npos ? ", not " + entry.value : ""));
     throw;
   }
@@ -222,17 +225,25 @@ void MergeSettings::check() const {
   if (screening_rounds < 0) throw InputError("screening_rounds must not be negative");
 }
 
+const OptionSection kFeatureSection = section<&JobOptions::features>("features");
+const OptionSection kCandidateSection = section<&JobOptions::candidates>("candidates");
+const OptionSection kMatchingSection = section<&JobOptions::matching, &JobOptions::tracks>("matching", "filter_model");
+const OptionSection kTileSection = section<&JobOptions::tiles>("tiles");
+const OptionSection kOrientationSection = section<&JobOptions::orientation>("orientation");
+const OptionSection kEnvironmentSection = section<&JobOptions::environment>("environment");
+const OptionSection kAdjustmentSection = section<&JobOptions::adjustment>("adjustment");
+const OptionSection kMergeSection = section<&JobOptions::merge>("merge");
+const OptionSection kDiagnosticsSection = section<&JobOptions::diagnostics>("diagnostics");
+
 JobOptions read_options(const StageSettings& settings) {
   JobOptions options;
-  for_each_section(options, [&](const std::string& section, auto&... parts) {
-    SettingsReader reader(settings, section);
-    (describe(reader, parts), ...);
-    reader.finish();
-  });
-  for_each_section(options, [&](const std::string& section, const auto&... parts) {
-    (check_section(settings, section, parts), ...);
-  });
-  options.orientation.observations = options.adjustment.observations;  // all stages share one description of them
+  for (const OptionSection* section : option_sections()) {
+    ReadingVisitor visitor(settings, section->name);
+    section->describe(visitor, options);
+    visitor.finish();
+  }
+  for (const OptionSection* section : option_sections()) check_section(settings, *section, options);
+  options.orientation.observations = options.adjustment.observations;  // one description for all stages
   return options;
 }
 
@@ -240,11 +251,11 @@ JobOptions options_of_job(const JobStore& store) { return read_options(JobJson::
 
 std::vector<OptionValue> option_values(const JobOptions& options) {
   std::vector<OptionValue> values;
-  JobOptions described = options;  // a copy, because a visitor could also write
-  for_each_section(described, [&](const std::string& section, auto&... parts) {
-    TextVisitor visitor(section, values);
-    (describe(visitor, parts), ...);
-  });
+  JobOptions described = options;  // a visitor may also write
+  for (const OptionSection* section : option_sections()) {
+    TextVisitor visitor(section->name, values);
+    section->describe(visitor, described);
+  }
   return values;
 }
 

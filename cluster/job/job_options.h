@@ -3,12 +3,14 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
 #include "adjust/orientation/orientation.h"
 #include "adjust/problem/environment_correction.h"
 #include "adjust/tile/tile_adjustment.h"
+#include "cluster/job/option_section.h"
 #include "io/base/hash.h"
 #include "io/block/block_diagnostics.h"
 #include "io/project/project.h"
@@ -43,15 +45,20 @@ struct JobOptions {
   EnvironmentOptions environment;
   AdjustOptions adjustment;
   MergeSettings merge;
-  DiagnosticsOptions diagnostics;  // only for the report: no unit depends on them
+  DiagnosticsOptions diagnostics;         // only for the report: no unit depends on them
+  std::map<std::string, double> numbers;  // "section.key": of a stage that describes its own (option_section.h)
 };
+
+// The sections, for the table of the stages (cluster/job/stage.h).
+extern const OptionSection kFeatureSection, kCandidateSection, kMatchingSection, kTileSection, kOrientationSection,
+    kEnvironmentSection, kAdjustmentSection, kMergeSection, kDiagnosticsSection;
 
 // The defaults with the values of the project file. Throws InputError with file:line for unknown keys and bad values.
 JobOptions read_options(const StageSettings& settings);
 // The options of the last run of a job.
 JobOptions options_of_job(const JobStore& store);
 
-// One option with its present value; lists of them are in the order of the documentation.
+// The values in force, in the order of the stages.
 struct OptionValue {
   std::string section, key, value;
 };

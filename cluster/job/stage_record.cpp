@@ -17,12 +17,15 @@ using Json = nlohmann::json;
 
 std::string file_of(const std::string& stage) { return "stages/" + stage + ".json"; }
 
-bool is_merge(const StageRecord& record) { return record.stage == "merge"; }
+bool iterates(const StageRecord& record) {
+  const Stage* stage = find_stage(record.stage);
+  return stage != nullptr && stage->iterates;
+}
 
 // The events of the present units of a stage.
 std::vector<UnitEvent> latest_events(const StageRecord& record, const std::vector<UnitEvent>& events) {
   std::vector<UnitEvent> found;
-  if (is_merge(record)) {  // the events of its iterations, and of the result that ends it
+  if (iterates(record)) {  // its iterations, and the result that ends it
     bool ended = false;
     for (const UnitEvent& event : events) {
       if (event.stage != record.stage) continue;
@@ -91,13 +94,13 @@ const char* name_of(StageState state) {
   return kNames[static_cast<int>(state)];
 }
 
-std::vector<StageStatus> stage_status(const JobStore& store, const std::vector<ExpectedStage>& expected) {
+std::vector<StageStatus> stage_status(const JobStore& store, const std::vector<Stage>& expected) {
   std::vector<StageStatus> stages;
   std::uint64_t basis = 0;
   bool stale = false;
-  for (const auto& [name, optional] : expected) {
+  for (const Stage& stage : expected) {
     StageStatus status;
-    if (const auto record = read_record(store, name)) {
+    if (const auto record = read_record(store, stage.name)) {
       status.record = *record;
       for (const auto& [unit, fingerprint] : record->units) status.done += store.up_to_date(unit, fingerprint) ? 1 : 0;
       stale = stale || record->basis != basis;
@@ -109,7 +112,7 @@ std::vector<StageStatus> stage_status(const JobStore& store, const std::vector<E
         status.state = StageState::kPartial;
       basis = record->hash();
     } else {
-      status.record.stage = name;
+      status.record.stage = stage.name;
     }
     stages.push_back(status);
   }

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "cluster/job/stage.h"
 #include "io/result/result.h"
 #include "io/store/job/events.h"
 #include "io/store/job/job_store.h"
@@ -39,12 +40,9 @@ struct StageStatus {
   StageState state = StageState::kWaiting;
   std::int64_t done = 0;  // units whose file exists and is up to date
 };
-struct ExpectedStage {
-  std::string name;
-  bool optional = false;  // not listed when it has no units and the next stage has some
-};
-// The states of these stages, which are in the order in which they run (cluster/stages/stages.h).
-std::vector<StageStatus> stage_status(const JobStore& store, const std::vector<ExpectedStage>& expected);
+// The states of these stages, which are in the order in which they run. An optional one is left out when it has no
+// units and the stage behind it has some.
+std::vector<StageStatus> stage_status(const JobStore& store, const std::vector<Stage>& expected);
 
 // Wall clock and memory of a stage, over all runs of the job: the time during which any rank worked on its units. Of
 // each unit the latest event counts; of a merge, all events since the merge before.

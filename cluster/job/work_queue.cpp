@@ -89,9 +89,9 @@ bool is_current(const Job& job, const std::string& unit, std::uint64_t fingerpri
   return current;
 }
 
-void begin_stage(Job& job, const std::string& stage, const std::vector<Unit>& units) {
-  if (job.records.empty() || job.records.back().stage != stage)
-    job.records.push_back({stage, job.records.empty() ? 0 : job.records.back().hash(), {}, {}});
+void begin_stage(Job& job, const Stage& stage, const std::vector<Unit>& units) {
+  if (job.records.empty() || job.records.back().stage != stage.name)
+    job.records.push_back({stage.name, job.records.empty() ? 0 : job.records.back().hash(), {}, {}});
   for (const Unit& unit : units) job.records.back().units.emplace_back(unit.name, unit.fingerprint);
   write_own_record(job);
 }
@@ -112,8 +112,9 @@ void part_done(Job& job, std::int64_t parts) {
   job.ranks.add_done(parts);
 }
 
-StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Unit>& units, const std::string& parts) {
-  begin_stage(job, stage, units);
+StageOutcome run_stage(Job& job, const Stage& row, const std::vector<Unit>& units) {
+  begin_stage(job, row, units);
+  const std::string stage = row.name;
   const double start_s = monotonic_seconds();
   job.log.write(LogLevel::kInfo, stage, "", "begins: " + counted(std::ssize(units), "unit"));
   return_freed_memory();
@@ -126,7 +127,7 @@ StageOutcome run_stage(Job& job, const std::string& stage, const std::vector<Uni
     const std::int64_t count = std::accumulate(units.begin(), units.end(), std::int64_t{0},
                                                [](std::int64_t sum, const Unit& unit) { return sum + unit.parts; });
     Progress progress(
-        stage, count, parts, [&] { return job.ranks.done(); }, job.options.quiet || !job.is_first_rank());
+        stage, count, row.parts, [&] { return job.ranks.done(); }, job.options.quiet || !job.is_first_rank());
     const std::vector<std::size_t> order = claim_order(units);
     while (!stop_requested()) {
       const double before_claim = monotonic_seconds();

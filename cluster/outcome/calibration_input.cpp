@@ -5,6 +5,7 @@
 
 #include "cluster/job/given_tracks.h"
 #include "cluster/job/job_options.h"
+#include "cluster/job/stage.h"
 #include "io/base/error.h"
 #include "io/project/project.h"
 #include "io/result/result.h"
@@ -38,7 +39,7 @@ void append_tracks(const TrackSet& from, const std::vector<std::uint8_t>& kept, 
 }
 
 CalibrationInput of_project(const std::string& path) {
-  Project project = read_project(path);
+  Project project = read_project(path, settings_sections());
   if (project.tie_points.empty())
     throw InputError(path + ": the project has no 'tie_points'; run 'megablock run " + path +
                      " -j JOB' and give JOB instead");

@@ -15,6 +15,7 @@
 #include "cluster/job/given_tracks.h"
 #include "cluster/job/job_json.h"
 #include "cluster/job/messages.h"
+#include "cluster/job/stage.h"
 #include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/arithmetic.h"
@@ -22,14 +23,7 @@
 #include "cluster/process/process_memory.h"
 #include "cluster/process/version.h"
 #include "cluster/stages/common/block_tables.h"
-#include "cluster/stages/merge/merge.h"
-#include "cluster/stages/pipeline/adjustment.h"
-#include "cluster/stages/pipeline/candidates.h"
-#include "cluster/stages/pipeline/features.h"
-#include "cluster/stages/pipeline/matching.h"
 #include "cluster/stages/pipeline/orientation.h"
-#include "cluster/stages/pipeline/tiles.h"
-#include "cluster/stages/pipeline/tracks.h"
 #include "cluster/stages/stages.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
@@ -120,7 +114,7 @@ std::vector<std::int64_t> merge_with_previous(const JobStore& store, const JobLo
 Project read_whole_project(const RunOptions& options) {
   if (!std::filesystem::exists(options.project))
     throw InputError(options.project + ": no such project file; write one with 'megablock init IMAGES -o block.yaml'");
-  Project project = read_project(options.project);
+  Project project = read_project(options.project, settings_sections());
   check_environment(read_options(project.settings).environment, project.block);
   return project;
 }
@@ -179,21 +173,26 @@ void remove_surplus(const Job& job, const std::vector<std::string>& tracks) {
   std::set<std::string> wanted(tracks.begin(), tracks.end());
   for (const StageRecord& record : job.records)
     for (const auto& unit : record.units) wanted.insert(unit.first);
-  for (const Stage& stage : all_stages())
-    if (stage.folder != nullptr)
-      for (const std::string& name : job.store.list(stage.folder))
-        if (!wanted.contains(name)) job.store.remove(name);
+  for (const std::string& folder : unit_folders())
+    for (const std::string& name : job.store.list(folder))
+      if (!wanted.contains(name)) job.store.remove(name);
 }
 
-void run_stages(Job& job, const std::string& tie_points) {
+// As far as the command `last` says; empty: all of them. Returns whether the last of all has run.
+bool run_stages(Job& job, const std::string& last, StageResults& results) {
+  const bool given_tie_points = !results.tie_points.empty();
+  for (const Stage& stage : all_stages()) {
+    if (!stage.runs(given_tie_points)) continue;
+    stage.run(stage, job, results);
+    if (stage.ends(last, given_tie_points)) return &stage == &all_stages().back();
+  }
+  return true;
+}
+
+void run_all(Job& job, const std::string& tie_points) {
   StageResults results;
   results.tie_points = tie_points;
-  for (const Stage& stage : all_stages()) {
-    if (!stage.runs(!tie_points.empty())) continue;
-    stage.run(job, results);
-    if (stage.ends(job.options.last_stage, !tie_points.empty()) && &stage != &all_stages().back()) return;
-  }
-  remove_surplus(job, results.tracks);
+  if (run_stages(job, job.options.last_stage, results)) remove_surplus(job, results.tracks);
 }
 
 // The tracks of all tiles, in the order of their indices.
@@ -221,22 +220,22 @@ TrackSource track_source(Job& job, const std::string& tie_points) {
     source.fingerprint = std::stoull(on_first_rank(job.ranks, [&] { return std::to_string(hash_file(tie_points)); }));
     return source;
   }
-  const FeatureStage features = run_features(job);
-  const CandidateGraph graph = run_candidates(job, features);
-  const std::vector<std::string> matches = run_matching(job, features, graph);
-  const Tiles tiles = run_tiles(job, matches);
-  const std::vector<std::string> tracks = run_tracks(job, matches, tiles);
-  index_measurements(job, tracks);
+  StageResults results;
+  results.needs_tiles = false;
+  run_stages(job, "match", results);
+  restore_names(job);
   Hasher hasher;
-  for (const std::string& unit : tracks) hasher.add(job.store.seal(unit)->content_hash);
-  return {"", hasher.value(), [&job, tracks] { return read_all_tracks(job, tracks); }, matches};
+  for (const std::string& unit : results.tracks) hasher.add(job.store.seal(unit)->content_hash);
+  return {"", hasher.value(), [&job, tracks = results.tracks] { return read_all_tracks(job, tracks); },
+          results.matches};
 }
 
 // Prepares the tracks and start poses of a calibration. An off-line calibration needs no matching.
 void calibrate_rigs(Job& job, const std::string& tie_points, const CalibrationSettings& settings) {
   const bool targets_alone = settings.rig.mode == CalibrationMode::kOffLine;
   const TrackSource source = targets_alone ? TrackSource() : track_source(job, tie_points);
-  BlockState start = source.matches.empty() ? initial_state(job.block) : run_orientation(job, source.matches);
+  BlockState start = source.matches.empty() ? initial_state(job.block)
+                                            : run_orientation(*find_stage("orientation"), job, source.matches);
   if (settings.rig.mode != CalibrationMode::kOnLine) resect_missing(job.block, start);
   TrackSet tracks;
   tracks.begin.push_back(0);
@@ -325,7 +324,7 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
 
 }  // namespace
 
-int run_job(const RunOptions& options, Communicator& ranks) { return with_job(options, ranks, run_stages); }
+int run_job(const RunOptions& options, Communicator& ranks) { return with_job(options, ranks, run_all); }
 
 namespace {
 

@@ -1,7 +1,10 @@
 #include "cluster/stages/stages.h"
 
 #include <algorithm>
+#include <span>
 
+#include "cluster/job/job.h"
+#include "cluster/job/job_options.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/process_memory.h"
 #include "cluster/stages/common/block_tables.h"
@@ -13,30 +16,37 @@
 #include "cluster/stages/pipeline/tiles.h"
 #include "cluster/stages/pipeline/tracks.h"
 #include "io/base/error.h"
+#include "io/store/units/adjustment_file.h"
+#include "io/store/units/features_file.h"
+#include "io/store/units/graph_files.h"
+#include "io/store/units/state_file.h"
+#include "io/store/units/tracks_file.h"
 
 namespace megablock {
 
 namespace {
 
-void features(Job& job, StageResults& results) { results.features = run_features(job); }
+void features(const Stage& stage, Job& job, StageResults& results) { results.features = run_features(stage, job); }
 
-void candidates(Job& job, StageResults& results) { results.candidates = run_candidates(job, results.features); }
+void candidates(const Stage& stage, Job& job, StageResults& results) {
+  results.candidates = run_candidates(stage, job, results.features);
+}
 
-void matching(Job& job, StageResults& results) {
-  results.matches = run_matching(job, results.features, results.candidates);
+void matching(const Stage& stage, Job& job, StageResults& results) {
+  results.matches = run_matching(stage, job, results.features, results.candidates);
   release_names(job);
   use_memory_sparingly();
 }
 
-void tiles(Job& job, StageResults& results) {
-  results.tiles =
-      results.tie_points.empty() ? run_tiles(job, results.matches) : run_tiles_of_tracks(job, results.tie_points);
+void tiles(const Stage& stage, Job& job, StageResults& results) {
+  results.tiles = results.tie_points.empty() ? run_tiles(stage, job, results.matches)
+                                             : run_tiles_of_tracks(stage, job, results.tie_points);
 }
 
-void tracks(Job& job, StageResults& results) {
-  results.tracks = results.tie_points.empty() ? run_tracks(job, results.matches, results.tiles)
-                                              : run_given_tracks(job, results.tie_points, results.tiles);
-  if (results.tiles.tile_count == 0)
+void tracks(const Stage& stage, Job& job, StageResults& results) {
+  results.tracks = results.tie_points.empty() ? run_tracks(stage, job, results.matches, results.tiles)
+                                              : run_given_tracks(stage, job, results.tie_points, results.tiles);
+  if (results.needs_tiles && results.tiles.tile_count == 0)
     throw AgreedError<ComputeError>(
         "no two images could be matched: nothing to orient; check overlap, masks and the match options");
   index_measurements(job, results.tracks);
@@ -48,11 +58,11 @@ bool orients_by_names(const Block& block) {
          std::any_of(block.frames.begin(), block.frames.end(), [](const Frame& f) { return !f.given_pose; });
 }
 
-void orientation(Job& job, StageResults& results) {
-  return_freed_memory();  // memory of the tracks
+void orientation(const Stage& stage, Job& job, StageResults& results) {
+  return_freed_memory();  // of the tracks
   job.tables.release();
   if (orients_by_names(job.block)) restore_names(job);
-  results.oriented = run_orientation(job, results.matches);
+  results.oriented = run_orientation(stage, job, results.matches);
   release_names(job);
   job.tables.release();
   const auto& oriented = results.oriented.oriented;
@@ -62,35 +72,104 @@ void orientation(Job& job, StageResults& results) {
         "leave out wrong GPS positions ('gps: {use: false}'), or give approximate poses ('poses')");
 }
 
-void adjustment(Job& job, StageResults& results) {
-  results.adjusted = run_adjustment(job, results.oriented, results.tiles, results.tracks);
+void adjustment(const Stage& stage, Job& job, StageResults& results) {
+  results.adjusted = run_adjustment(stage, job, results.oriented, results.tiles, results.tracks);
 }
 
-void merge(Job& job, StageResults& results) {
-  run_merge(job, std::move(results.oriented), results.tiles, results.tracks, results.adjusted);
+void merge(const Stage& stage, Job& job, StageResults& results) {
+  run_merge(stage, job, std::move(results.oriented), results.tiles, results.tracks, results.adjusted);
 }
 
 constexpr Stage kStages[] = {
-    // name, command, in a job of given tie points, help, folder, optional, run
-    {"features", "", nullptr, nullptr, "features", false, features},
-    {"candidates", "partition", nullptr, "Run as far as the candidate pairs and cells", nullptr, false, candidates},
-    {"matching", "", nullptr, nullptr, "matches", false, matching},
-    {"tiles", "", "partition", nullptr, nullptr, false, tiles},
-    {"tracks", "match", "match", "Run as far as matches, tiles and tracks", "tracks", false, tracks},
-    {"orientation", "orient", "orient", "Run as far as the initial orientation", "orient", true, orientation},
-    {"adjustment", "adjust", "adjust", "Run as far as the adjustment of the tiles", "adjust", false, adjustment},
-    {"merge", "merge", "merge", "Run as far as the merged block", nullptr, false, merge},
+    {.name = "features",
+     .needs = "images, masks",
+     .makes = "features/<shard>.h5",
+     .unit = "64 images",
+     .parts = "images",
+     .sections = {&kFeatureSection},
+     .kind = "features",
+     .read_file = [](const std::string& path) { read_features(path); },
+     .run = features},
+    {.name = "candidates",
+     .needs = "features, positions, attitudes",
+     .makes = "graph.h5",
+     .unit = "block",
+     .command = "partition",
+     .help = "Run as far as the candidate pairs and cells",
+     .sections = {&kCandidateSection},
+     .kind = "candidates",
+     .read_file = [](const std::string& path) { read_candidates(path); },
+     .run = candidates},
+    {.name = "matching",
+     .needs = "features, candidates",
+     .makes = "matches/<cell>.h5",
+     .unit = "cell of pairs",
+     .algorithm = 12,
+     .sections = {&kMatchingSection},
+     .kind = "matches",
+     .read_file = [](const std::string& path) { read_matches(path); },
+     .run = matching},
+    {.name = "tiles",
+     .needs = "matching, or given tie points",
+     .makes = "tiles.h5",
+     .unit = "block",
+     .algorithm = 3,
+     .command_given = "partition",
+     .sections = {&kTileSection},
+     .kind = "tiles",
+     .read_file = [](const std::string& path) { read_tiles(path); },
+     .run = tiles},
+    {.name = "tracks",
+     .needs = "features, matching, or given tie points; tiles",
+     .makes = "tracks/<tile>.h5",
+     .unit = "block",
+     .algorithm = 3,
+     .command = "match",
+     .command_given = "match",
+     .help = "Run as far as matches, tiles and tracks",
+     .kind = "tracks",
+     .read_file = [](const std::string& path) { read_tracks(path); },
+     .run = tracks},
+    {.name = "orientation",
+     .needs = "features, matching, where poses are not given",
+     .makes = "orient/<generation>.h5",
+     .unit = "images that were added together",
+     .algorithm = 9,
+     .command = "orient",
+     .command_given = "orient",
+     .help = "Run as far as the initial orientation",
+     .optional = true,
+     .sections = {&kOrientationSection},
+     .kind = "orientation",
+     .read_file = [](const std::string& path) { read_orientation(path); },
+     .run = orientation},
+    {.name = "adjustment",
+     .needs = "tiles, tracks, orientation",
+     .makes = "adjust/<tile>.h5",
+     .unit = "tile",
+     .algorithm = 17,
+     .command = "adjust",
+     .command_given = "adjust",
+     .help = "Run as far as the adjustment of the tiles",
+     .sections = {&kEnvironmentSection, &kAdjustmentSection},
+     .kind = "adjustment",
+     .read_file = [](const std::string& path) { read_adjustment(path); },
+     .run = adjustment},
+    {.name = "merge",
+     .needs = "tiles, tracks, orientation, adjustment",
+     .makes = "result/block.h5",
+     .unit = "block",
+     .algorithm = 19,
+     .command = "merge",
+     .command_given = "merge",
+     .help = "Run as far as the merged block",
+     .iterates = true,
+     .sections = {&kMergeSection, &kDiagnosticsSection},
+     .run = merge},
 };
 
 }  // namespace
 
 std::span<const Stage> all_stages() { return kStages; }
-
-std::vector<ExpectedStage> expected_stages(bool given_tie_points) {
-  std::vector<ExpectedStage> stages;
-  for (const Stage& stage : kStages)
-    if (stage.runs(given_tie_points)) stages.push_back({stage.name, stage.optional});
-  return stages;
-}
 
 }  // namespace megablock

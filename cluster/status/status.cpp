@@ -8,10 +8,10 @@
 #include <optional>
 
 #include "cluster/job/job_json.h"
+#include "cluster/job/stage.h"
 #include "cluster/job/stage_record.h"
 #include "cluster/outcome/result_figures.h"
 #include "cluster/process/progress.h"
-#include "cluster/stages/stages.h"
 #include "io/base/error.h"
 #include "io/result/result.h"
 #include "io/store/job/events.h"
@@ -26,7 +26,7 @@ namespace {
 using Json = nlohmann::json;
 
 std::vector<StageStatus> stages_of(const JobStore& store, const JobJson& job) {
-  return stage_status(store, expected_stages(!job.value<std::string>("tie_points", "").empty()));
+  return stage_status(store, stages_of_job(!job.value<std::string>("tie_points", "").empty()));
 }
 
 Json stages_json(const JobStore& store, const std::vector<StageStatus>& stages) {

@@ -4,6 +4,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "io/base/error.h"
@@ -34,19 +35,18 @@ std::string text_of(const YAML::Node& node) {
 }
 
 // Returns the options of the stages. Those of the sections gps and attitude are added for the report only.
-StageSettings read_stage_settings(YamlReader& top) {
+StageSettings read_stage_settings(YamlReader& top, const std::vector<SettingsSection>& sections) {
   StageSettings settings;
   for (const char* section : {"gps", "attitude"})
     if (auto reader = top.mapping(section))
       for (const std::string& key : reader->keys())
         settings.entries.push_back({section, key, text_of(*reader->node(key)), reader->where(key)});
-  for (const std::string& section : stage_sections()) {
-    auto reader = top.mapping(section);
+  for (const SettingsSection& section : sections) {
+    auto reader = top.mapping(section.name);
     if (!reader) continue;
     for (const std::string& key : reader->keys()) {
-      const bool is_file = section == "matching" && key == "filter_model";
-      const auto value = is_file ? reader->existing_file(key) : reader->text(key);
-      settings.entries.push_back({section, key, *value, reader->where(key)});
+      const auto value = key == section.file_key ? reader->existing_file(key) : reader->text(key);
+      settings.entries.push_back({section.name, key, *value, reader->where(key)});
     }
   }
   return settings;
@@ -79,9 +79,9 @@ void check_tie_points(YamlReader& top, const std::string& file) {
 }
 
 // Throws InputError for sections of stages that do not run with given tie points.
-void refuse_unused_stages(const YamlReader& top) {
+void refuse_unused_stages(const YamlReader& top, const std::vector<SettingsSection>& sections) {
   for (const std::string& key : top.keys())
-    if (key == "features" || key == "candidates" || key == "matching")
+    if (std::ranges::any_of(sections, [&](const SettingsSection& s) { return s.needs_images && s.name == key; }))
       refuse_unused(top, key, "with 'tie_points', which are measured and matched already");
 }
 
@@ -97,7 +97,8 @@ std::vector<std::string> names_left_out(const Project& project) {
 // cameras and frames; rigs join frames; a calibration needs cameras and mounts. Poses and control are read before the
 // positions, because they may give the origin, but are added after them: only then is the ground frame known. Attitudes
 // need the positions, for the vertical at each of them.
-void read_block_sections(YamlReader& top, Project& project, const std::optional<GroundFrame>& ground) {
+void read_block_sections(YamlReader& top, Project& project, const std::vector<SettingsSection>& sections,
+                         const std::optional<GroundFrame>& ground) {
   const auto images = top.existing_folder("images");
   const auto block_file = top.existing_file("block");
   if (images && block_file)
@@ -110,7 +111,7 @@ void read_block_sections(YamlReader& top, Project& project, const std::optional<
   if (const auto tie_points = top.existing_file("tie_points")) {
     check_tie_points(top, *tie_points);
     project.tie_points = *tie_points;
-    refuse_unused_stages(top);
+    refuse_unused_stages(top, sections);
   }
   if (block_file && project.tie_points.empty())
     throw InputError(top.where("block") + ": 'block' needs 'tie_points' as well: there are no images to measure in");
@@ -163,14 +164,13 @@ void refuse_unused(const YamlReader& reader, const std::string& key, const std::
   throw InputError(reader.where(key) + ": '" + key + "' is not used " + why + "; take it out");
 }
 
-Project read_project(const std::string& path) { return read_project(path, std::nullopt); }
-
-Project read_project(const std::string& path, const std::optional<GroundFrame>& ground) {
+Project read_project(const std::string& path, const std::vector<SettingsSection>& sections,
+                     const std::optional<GroundFrame>& ground) {
   Project project;
   project.file = fs::absolute(path).lexically_normal().string();
   YamlReader top = read_yaml(path);
-  project.settings = read_stage_settings(top);
-  read_block_sections(top, project, ground);
+  project.settings = read_stage_settings(top, sections);
+  read_block_sections(top, project, sections, ground);
   top.finish();
   try {
     check(project.block);

@@ -35,10 +35,11 @@ struct Project {
   std::vector<std::string> warnings;  // one line each: GPS at 0, 0, copies, outliers, ...
 };
 
-// Reads and checks a project. Throws InputError with file:line for unknown keys, wrong types or units, missing files.
-Project read_project(const std::string& path);
-// The same in the ground frame of a running job, so that images added later cannot move the origin.
-Project read_project(const std::string& path, const std::optional<GroundFrame>& ground);
+// Reads and validates; InputError with file:line for unknown keys, wrong types or units, missing files. `sections`:
+// those of the program that reads the options. `ground`: of a running job, so that images added later cannot move the
+// origin.
+Project read_project(const std::string& path, const std::vector<SettingsSection>& sections = {},
+                     const std::optional<GroundFrame>& ground = std::nullopt);
 
 // The file name of a camera's mask in the folder `masks`: "<camera>.png", with '_' for '/' in the camera's name.
 std::string mask_file_name(const std::string& camera);

@@ -19,13 +19,10 @@
 #include "io/result/track_batches.h"
 #include "io/store/hdf5/hdf5_file.h"
 #include "io/store/job/events.h"
-#include "io/store/units/adjustment_file.h"
 #include "io/store/units/block_file.h"
-#include "io/store/units/features_file.h"
 #include "io/store/units/graph_files.h"
 #include "io/store/units/registration_file.h"
 #include "io/store/units/state_file.h"
-#include "io/store/units/tracks_file.h"
 
 namespace megablock {
 
@@ -33,7 +30,7 @@ namespace {
 
 class Check {
  public:
-  explicit Check(const JobStore& store) : store_(store) {}
+  Check(const JobStore& store, const std::vector<StageFiles>& stages) : store_(store), stages_(stages) {}
 
   std::vector<std::string> run() {
     if (!std::filesystem::exists(store_.directory()))
@@ -88,20 +85,15 @@ class Check {
     if (kind == "result") {
       check_result(path);
     } else {
-      const std::map<std::string, std::function<void()>> readers = {
+      std::map<std::string, std::function<void()>> readers = {
           {"block", [&] { check(read_block(path)); }},
-          {"features", [&] { read_features(path); }},
-          {"candidates", [&] { read_candidates(path); }},
-          {"matches", [&] { read_matches(path); }},
-          {"tiles", [&] { read_tiles(path); }},
-          {"tracks", [&] { read_tracks(path); }},
-          {"measurement_index", [&] { check_measurement_index(store_); }},
+          {kMeasurementIndexKind, [&] { check_measurement_index(store_); }},
           {"state", [&] { read_state(path); }},
-          {"orientation", [&] { read_orientation(path); }},
-          {"adjustment", [&] { read_adjustment(path); }},
           {"places", [&] { read_places(path); }},
           {"registrations", [&] { read_registrations(path); }},
           {"trajectory", [&] { read_trajectory(path); }}};
+      for (const StageFiles& stage : stages_)
+        if (stage.read) readers[stage.kind] = [&] { stage.read(path); };
       if (const auto reader = readers.find(kind); reader != readers.end()) reader->second();
     }
   }
@@ -123,7 +115,9 @@ class Check {
     const std::int64_t tiles = read_tiles(store_.verified_path("tiles.h5")).tile_count;
     if (store_.seal(kTrackList) && !std::filesystem::exists(store_.path(kMeasurementIndex)))
       problems_.push_back(store_.path(kMeasurementIndex) + ": is missing; run the job again to make it");
-    for (const char* folder : {"tracks", "adjust"}) {
+    for (const StageFiles& stage : stages_) {
+      const std::string& folder = stage.folder_by_tile;
+      if (folder.empty()) continue;
       const std::vector<std::string> names = store_.list(folder);
       std::int64_t found = 0;
       for (const std::string& name : names) found += name.ends_with(".h5");
@@ -134,6 +128,7 @@ class Check {
   }
 
   const JobStore& store_;
+  const std::vector<StageFiles>& stages_;
   std::vector<std::string> problems_;
 };
 
@@ -145,6 +140,8 @@ bool holds_job(const JobStore& store) {
                              [&](const char* own) { return std::filesystem::exists(store.path(own), error); });
 }
 
-std::vector<std::string> check_job(const JobStore& store) { return Check(store).run(); }
+std::vector<std::string> check_job(const JobStore& store, const std::vector<StageFiles>& stages) {
+  return Check(store, stages).run();
+}
 
 }  // namespace megablock

@@ -92,13 +92,6 @@ std::string unknown_key_message(const std::string& key, const std::string& secti
   return message + " known keys: " + (list.empty() ? "none" : list);
 }
 
-const std::vector<std::string>& stage_sections() {
-  static const std::vector<std::string> sections = {"features",   "candidates",  "matching",
-                                                    "tiles",      "orientation", "environment",
-                                                    "adjustment", "merge",       "diagnostics"};
-  return sections;
-}
-
 SettingsReader::SettingsReader(const StageSettings& settings, std::string section)
     : settings_(settings), section_(std::move(section)) {}
 

@@ -41,9 +41,6 @@ class SettingsReader {
   std::vector<std::string> known_;
 };
 
-// The sections that belong to stages, in the order of the pipeline.
-const std::vector<std::string>& stage_sections();
-
 // Parsers of single values, shared by all readers of the project file. `what` is the key, `where` is file:line.
 double parse_number(const std::string& text, const std::string& what, const std::string& where);
 std::int64_t parse_integer(const std::string& text, const std::string& what, const std::string& where);

@@ -16,4 +16,11 @@ struct StageSettings {
   std::vector<Entry> entries;
 };
 
+// A section with such options.
+struct SettingsSection {
+  std::string name;
+  std::string file_key;       // the key that names a file; empty: none
+  bool needs_images = false;  // not used with given tie points
+};
+
 }  // namespace megablock

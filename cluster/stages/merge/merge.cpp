@@ -18,7 +18,6 @@
 #include "cluster/process/progress.h"
 #include "cluster/process/signals.h"
 #include "cluster/stages/common/block_tables.h"
-#include "cluster/stages/common/units.h"
 #include "cluster/stages/merge/assemble_result.h"
 #include "cluster/stages/merge/block_image_sigma.h"
 #include "cluster/stages/merge/merge_checkpoint.h"
@@ -34,9 +33,9 @@ namespace megablock {
 
 namespace {
 
-std::uint64_t inputs_fingerprint(const Job& job, const MergeInputs& inputs) {
+std::uint64_t inputs_fingerprint(const Stage& stage, const Job& job, const MergeInputs& inputs) {
   Hasher hasher;
-  hasher.add(algorithm::kMerge);
+  hasher.add(stage.algorithm);
   add_to_hash(hasher, job.settings.merge);
   add_to_hash(hasher, job.settings.adjustment);
   if (job.settings.environment.any()) add_to_hash(hasher, job.settings.environment);
@@ -252,15 +251,15 @@ void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint,
 
 }  // namespace
 
-void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vector<std::string>& tracks,
-               const std::vector<std::string>& adjusted_units) {
+void run_merge(const Stage& stage, Job& job, BlockState oriented, const Tiles& tiles,
+               const std::vector<std::string>& tracks, const std::vector<std::string>& adjusted_units) {
   const double start = monotonic_seconds();
   return_freed_memory();
   job.peak_memory.begin_stage();
   MergeInputs inputs{std::move(oriented), tiles, tracks, adjusted_units};
-  const std::uint64_t fingerprint = inputs_fingerprint(job, inputs);
+  const std::uint64_t fingerprint = inputs_fingerprint(stage, job, inputs);
   const std::string before = shortfall_before(job);
-  begin_stage(job, "merge", {{kResult, fingerprint, 0, nullptr}});
+  begin_stage(job, stage, {{kResult, fingerprint, 0, nullptr}});
   const std::string current = on_first_rank(job.ranks, [&]() -> std::string {
     if (!is_current(job, kResult, fingerprint)) return "";
     return std::filesystem::exists(job.store.path(kReportPage)) ? "current" : "";

@@ -5,12 +5,13 @@
 #include <vector>
 
 #include "cluster/job/job.h"
+#include "cluster/job/stage.h"
 #include "io/block/image_graph.h"
 
 namespace megablock {
 
 // Makes merge/..., result/block.h5 and result/report.html. The block of the job must not be used afterwards.
-void run_merge(Job& job, BlockState oriented, const Tiles& tiles, const std::vector<std::string>& tracks,
-               const std::vector<std::string>& adjusted);
+void run_merge(const Stage& stage, Job& job, BlockState oriented, const Tiles& tiles,
+               const std::vector<std::string>& tracks, const std::vector<std::string>& adjusted);
 
 }  // namespace megablock

@@ -143,7 +143,8 @@ struct TileMark {
 };
 
 // Collective. The marks of all tiles; every rank reads its share of the tiles.
-std::vector<TileMark> tile_marks(const Job& job, const OrientedTiles& from, const std::vector<std::string>& tracks) {
+std::vector<TileMark> tile_marks(const Stage& stage, const Job& job, const OrientedTiles& from,
+                                 const std::vector<std::string>& tracks) {
   const auto ranks = static_cast<std::size_t>(job.ranks.size());
   ByteWriter writer;
   char kind = 'c';
@@ -153,7 +154,7 @@ std::vector<TileMark> tile_marks(const Job& job, const OrientedTiles& from, cons
       const TileStart start = measured_start(job, from, TileIndex(static_cast<std::int64_t>(t)),
                                              read_tracks(job.store.verified_path(tracks[t])));
       Hasher hasher;
-      hasher.add(algorithm::kAdjustment);
+      hasher.add(stage.algorithm);
       add_to_hash(hasher, job.settings.adjustment);
       if (job.settings.environment.any()) add_to_hash(hasher, job.settings.environment);
       add_to_hash(hasher, start.problem, start.state);
@@ -178,17 +179,17 @@ std::vector<TileMark> tile_marks(const Job& job, const OrientedTiles& from, cons
 
 }  // namespace
 
-std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, const Tiles& tiles,
+std::vector<std::string> run_adjustment(const Stage& stage, Job& job, const BlockState& oriented, const Tiles& tiles,
                                         const std::vector<std::string>& tracks) {
   const OrientedTiles from{oriented, tiles, rows_of_tiles(job.block, oriented, tiles)};
   job.tables.release();
-  const std::vector<TileMark> marks = tile_marks(job, from, tracks);
+  const std::vector<TileMark> marks = tile_marks(stage, job, from, tracks);
   std::vector<Unit> units;
   std::vector<std::string> names;
   for (std::size_t t = 0; t < tracks.size(); ++t) {
     const TileIndex tile(static_cast<std::int64_t>(t));
     Unit unit;
-    unit.name = unit_name("adjust", tile.value);
+    unit.name = unit_name(stage.folder(), tile.value);
     unit.fingerprint = marks[t].fingerprint;
     unit.cost = static_cast<double>(marks[t].observations);
     unit.write = [&job, &from, tile, track = tracks[t]](const std::string& path) {
@@ -197,11 +198,11 @@ std::vector<std::string> run_adjustment(Job& job, const BlockState& oriented, co
     names.push_back(unit.name);
     units.push_back(std::move(unit));
   }
-  const StageOutcome outcome = run_stage(job, "adjustment", units);
+  const StageOutcome outcome = run_stage(job, stage, units);
   for (const FailedUnit& failure : outcome.failures) std::erase(names, failure.unit);
   if (names.empty()) throw AgreedError<ComputeError>("no tile could be adjusted: " + outcome.failures.front().reason);
   for (std::size_t t = 0; t < tracks.size(); ++t) {
-    const std::string name = unit_name("adjust", static_cast<std::int64_t>(t));
+    const std::string name = unit_name(stage.folder(), static_cast<std::int64_t>(t));
     if (std::find(names.begin(), names.end(), name) == names.end())
       names.insert(names.begin() + static_cast<long>(t), "");
   }

@@ -6,6 +6,7 @@
 
 #include "adjust/registration/frame_resection.h"
 #include "cluster/job/given_tracks.h"
+#include "cluster/job/stage.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/version.h"
 #include "io/evaluation/calibration_report.h"
@@ -22,7 +23,7 @@ bool all_oriented(const BlockState& state) {
 }
 
 VerificationSite read_site(const std::string& file) {
-  Project project = read_project(file);
+  Project project = read_project(file, settings_sections());
   if (project.tie_points.empty())
     throw InputError(file + ": a verification site needs 'tie_points' in its project file");
   BlockState state = initial_state(project.block);

@@ -3,7 +3,6 @@
 #include "cluster/job/work_queue.h"
 #include "cluster/stages/common/block_hash.h"
 #include "cluster/stages/common/growth.h"
-#include "cluster/stages/common/units.h"
 #include "cluster/stages/pipeline/features.h"
 #include "io/base/hash.h"
 #include "io/store/units/features_file.h"
@@ -22,9 +21,9 @@ GlobalDescriptors read_descriptors(const Job& job, const FeatureStage& features)
   return all;
 }
 
-std::uint64_t candidates_fingerprint(const Job& job, const FeatureStage& features) {
+std::uint64_t candidates_fingerprint(const Stage& stage, const Job& job, const FeatureStage& features) {
   Hasher hasher;
-  hasher.add(algorithm::kCandidates);
+  hasher.add(stage.algorithm);
   add_to_hash(hasher, job.settings.candidates);
   hasher.add(features.image_fingerprint).add(job.generations);
   for (ImageIndex i(0); job.block.images.contains(i); ++i.value)
@@ -44,10 +43,10 @@ std::uint64_t candidates_fingerprint(const Job& job, const FeatureStage& feature
 
 }  // namespace
 
-CandidateGraph run_candidates(Job& job, const FeatureStage& features) {
+CandidateGraph run_candidates(const Stage& stage, Job& job, const FeatureStage& features) {
   Unit unit;
-  unit.name = "graph.h5";
-  unit.fingerprint = candidates_fingerprint(job, features);
+  unit.name = stage.makes;
+  unit.fingerprint = candidates_fingerprint(stage, job, features);
   unit.write = [&](const std::string& path) {
     const GlobalDescriptors descriptors = read_descriptors(job, features);
     // Grown step by step as the block has grown, so that pairs and cells of earlier images stay the same.
@@ -62,7 +61,7 @@ CandidateGraph run_candidates(Job& job, const FeatureStage& features) {
     }
     write_candidates(path, graph);
   };
-  run_stage(job, "candidates", {unit});
+  run_stage(job, stage, {unit});
   return read_candidates(job.store.verified_path(unit.name));
 }
 

@@ -2,12 +2,13 @@
 #pragma once
 
 #include "cluster/job/job.h"
+#include "cluster/job/stage.h"
 #include "cluster/stages/pipeline/features.h"
 #include "io/block/image_graph.h"
 
 namespace megablock {
 
 // Collective.
-CandidateGraph run_candidates(Job& job, const FeatureStage& features);
+CandidateGraph run_candidates(const Stage& stage, Job& job, const FeatureStage& features);
 
 }  // namespace megablock

@@ -34,14 +34,14 @@ std::uint64_t shard_fingerprint(const std::vector<std::uint64_t>& image_fingerpr
   return hasher.value();
 }
 
-std::vector<std::uint64_t> image_fingerprints(const Job& job) {
+std::vector<std::uint64_t> image_fingerprints(const Job& job, int algorithm) {
   IndexedVector<CameraIndex, std::uint64_t> masks;
   for (const Camera& camera : job.block.cameras) masks.push_back(mask_hash(camera.mask_path));
   std::vector<std::uint64_t> fingerprints;
   for (std::size_t i = 0; i < job.block.images.size(); ++i) {
     const ImageIndex image(static_cast<std::int64_t>(i));
     Hasher hasher;
-    hasher.add(algorithm::kFeatures);
+    hasher.add(algorithm);
     add_to_hash(hasher, job.settings.features);
     hasher.add(job.block.images[image].file_hash).add(masks[job.block.camera_of(image)]);
     fingerprints.push_back(hasher.value());
@@ -134,51 +134,54 @@ void write_shard(Job& job, const Shard& shard, const std::string& path) {
 }
 
 // Records images without features as failures of the run, with their reasons.
-void list_unreadable(Job& job, const FeatureStage& stage) {
+void list_unreadable(const Stage& stage, Job& job, const FeatureStage& outcome) {
   const std::string text = on_first_rank(job.ranks, [&] {
     nlohmann::json failed = nlohmann::json::array();
-    for (const std::string& shard : stage.shards)
+    for (const std::string& shard : outcome.shards)
       for (const ImageFeatures& image : read_keypoints(job.store.verified_path(shard)))
         if (!image.failure.empty()) failed.push_back({job.block.name_of(image.image), image.failure});
     return failed.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   });
   std::vector<FailedUnit> failures;
-  for (const auto& entry : nlohmann::json::parse(text)) failures.push_back({"features", entry[0], entry[1]});
+  for (const auto& entry : nlohmann::json::parse(text)) failures.push_back({stage.name, entry[0], entry[1]});
   add_failures(job, failures);
 }
 
 }  // namespace
 
-FeatureStage run_features(Job& job) {
-  FeatureStage stage;
-  stage.image_fingerprint = image_fingerprints(job);
+FeatureStage run_features(const Stage& stage, Job& job) {
+  FeatureStage made;
+  made.image_fingerprint = image_fingerprints(job, stage.algorithm);
   const auto images = static_cast<std::int64_t>(job.block.images.size());
   std::vector<Unit> units;
   for (std::int64_t first = 0; first < images; first += kShardImages) {
     const std::int64_t end = std::min(images, first + kShardImages);
-    const Shard shard{unit_name("features", first / kShardImages),
+    const Shard shard{unit_name(stage.folder(), first / kShardImages),
                       first,
-                      {stage.image_fingerprint.begin() + first, stage.image_fingerprint.begin() + end}};
+                      {made.image_fingerprint.begin() + first, made.image_fingerprint.begin() + end}};
     Unit unit;
     unit.name = shard.name;
     unit.fingerprint = shard_fingerprint(shard.image_fingerprints);
     unit.parts = end - first;
     unit.cost = static_cast<double>(unit.parts);
     unit.write = [&job, shard](const std::string& path) { write_shard(job, shard, path); };
-    stage.shards.push_back(unit.name);
+    made.shards.push_back(unit.name);
     units.push_back(std::move(unit));
   }
-  const StageOutcome outcome = run_stage(job, "features", units, "images");
-  if (!outcome.failures.empty()) throw AgreedError<ComputeError>("features: " + outcome.failures.front().reason);
-  list_unreadable(job, stage);
-  return stage;
+  const StageOutcome outcome = run_stage(job, stage, units);
+  if (!outcome.failures.empty())
+    throw AgreedError<ComputeError>(std::string(stage.name) + ": " + outcome.failures.front().reason);
+  list_unreadable(stage, job, made);
+  return made;
 }
+
+std::string feature_unit(std::int64_t shard) { return unit_name(find_stage("features")->folder(), shard); }
 
 const FeatureCache::Shard& FeatureCache::shard(std::int64_t number) {
   auto found = std::find_if(shards_.begin(), shards_.end(), [&](const Shard& s) { return s.number == number; });
   if (found == shards_.end()) {
     if (shards_.size() >= capacity_) shards_.erase(shards_.begin());
-    shards_.push_back({number, read_features(store_.verified_path(unit_name("features", number)))});
+    shards_.push_back({number, read_features(store_.verified_path(feature_unit(number)))});
     return shards_.back();
   }
   std::rotate(found, found + 1, shards_.end());

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cluster/job/job.h"
+#include "cluster/job/stage.h"
 #include "cluster/stages/common/units.h"
 #include "io/block/features.h"
 
@@ -17,7 +18,10 @@ struct FeatureStage {
   std::vector<std::uint64_t> image_fingerprint;
   std::vector<std::string> shards;
 };
-FeatureStage run_features(Job& job);
+FeatureStage run_features(const Stage& stage, Job& job);
+
+// The unit of a shard, for the stages that read it.
+std::string feature_unit(std::int64_t shard);
 
 // Reads keypoints and descriptors by image, with a few shards in memory at a time.
 class FeatureCache {

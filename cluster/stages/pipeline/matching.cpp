@@ -85,10 +85,10 @@ std::vector<CellPair> cell_pairs(const CandidateGraph& graph, std::size_t cell, 
 // Algorithm number of the use of verticals in matching. Pairs without verticals stay valid when it is raised.
 constexpr int kUprightMatching = 3;
 
-std::uint64_t cell_fingerprint(const Job& job, const FeatureStage& features, const std::vector<CellPair>& pairs,
-                               const Knowledge& knowledge) {
+std::uint64_t cell_fingerprint(const Stage& stage, const Job& job, const FeatureStage& features,
+                               const std::vector<CellPair>& pairs, const Knowledge& knowledge) {
   Hasher hasher;
-  hasher.add(algorithm::kMatching);
+  hasher.add(stage.algorithm);
   add_to_hash(hasher, job.settings.matching);
   for (const CellPair& pair : pairs)
     if (const auto known = knowledge.trajectory.relate(pair.a, pair.b)) {
@@ -168,7 +168,8 @@ std::vector<VerifiedPair> match_cell(const Job& job, FeatureCache& cache, const 
 
 }  // namespace
 
-std::vector<std::string> run_matching(Job& job, const FeatureStage& features, const CandidateGraph& graph) {
+std::vector<std::string> run_matching(const Stage& stage, Job& job, const FeatureStage& features,
+                                      const CandidateGraph& graph) {
   constexpr std::size_t kResidentShards = 16;
   FeatureCache cache(job.store, kResidentShards);
   const Knowledge knowledge(job);
@@ -177,8 +178,8 @@ std::vector<std::string> run_matching(Job& job, const FeatureStage& features, co
   for (std::size_t cell = 0; cell + 1 < graph.cell_begin.size(); ++cell) {
     const std::vector<CellPair> pairs = cell_pairs(graph, cell, knowledge);
     Unit unit;
-    unit.name = unit_name("matches", static_cast<std::int64_t>(cell));
-    unit.fingerprint = cell_fingerprint(job, features, pairs, knowledge);
+    unit.name = unit_name(stage.folder(), static_cast<std::int64_t>(cell));
+    unit.fingerprint = cell_fingerprint(stage, job, features, pairs, knowledge);
     unit.cost = static_cast<double>(pairs.size());
     unit.write = [&job, &cache, &knowledge, pairs](const std::string& path) {
       write_matches(path, match_cell(job, cache, knowledge, pairs));
@@ -186,7 +187,7 @@ std::vector<std::string> run_matching(Job& job, const FeatureStage& features, co
     names.push_back(unit.name);
     units.push_back(std::move(unit));
   }
-  run_stage(job, "matching", units);
+  run_stage(job, stage, units);
   std::erase_if(names, [&](const std::string& name) { return !job.store.seal(name); });
   return names;
 }

@@ -5,13 +5,15 @@
 #include <vector>
 
 #include "cluster/job/job.h"
+#include "cluster/job/stage.h"
 #include "cluster/stages/pipeline/features.h"
 #include "io/block/image_graph.h"
 
 namespace megablock {
 
 // Collective. Returns the unit names.
-std::vector<std::string> run_matching(Job& job, const FeatureStage& features, const CandidateGraph& graph);
+std::vector<std::string> run_matching(const Stage& stage, Job& job, const FeatureStage& features,
+                                      const CandidateGraph& graph);
 
 // Reads all matches of the units, in the order of the units.
 std::vector<VerifiedPair> read_all_matches(const Job& job, const std::vector<std::string>& matches);

@@ -187,19 +187,19 @@ void set_aside(Job& job, const std::vector<SetAsideVertical>& verticals, std::ve
   all.insert(all.end(), verticals.begin(), verticals.end());
 }
 
-void tell_of_verticals(Job& job, const std::vector<SetAsideVertical>& aside, std::size_t all) {
+void tell_of_verticals(const Stage& stage, Job& job, const std::vector<SetAsideVertical>& aside, std::size_t all) {
   const std::string text = set_aside_text(job.block, aside, all);
   if (text.empty()) return;
   job.notes.push_back(text);
-  say(job, "orientation", text);
+  say(job, stage.name, text);
 }
 
 // With all poses given nothing is oriented. Given poses may still be poor, and are then adjusted to the observations of
 // their frames.
-BlockState given_orientation(const Job& job, BlockState given) {
+BlockState given_orientation(const Stage& stage, const Job& job, BlockState given) {
   const GivenTrajectoryChange change = adjust_trajectories(job.block, job.settings.adjustment.observations, given);
   if (change.frames > 0)
-    say(job, "orientation",
+    say(job, stage.name,
         fmt::format("given poses drift away from the observations of their frames and are adjusted to them as a start: "
                     "{} frames in {}, moved by {:.3g} m rms, {:.3g} m at most",
                     change.frames, counted(change.trajectories, "drive"), change.rms_m, change.largest_m));
@@ -208,15 +208,15 @@ BlockState given_orientation(const Job& job, BlockState given) {
 
 }  // namespace
 
-BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
+BlockState run_orientation(const Stage& stage, Job& job, const std::vector<std::string>& matches) {
   BlockState start = initial_state(job.block);
   const std::size_t verticals = job.block.verticals.size();
   std::vector<SetAsideVertical> aside;
   set_aside(job, against_given_poses(job.block), aside);
   if (std::all_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; })) {
-    if (job.is_first_rank()) remove_record(job.store, "orientation");  // an earlier run may have needed the stage
-    tell_of_verticals(job, aside, verticals);
-    return given_orientation(job, std::move(start));
+    if (job.is_first_rank()) remove_record(job.store, stage.name);  // an earlier run may have needed the stage
+    tell_of_verticals(stage, job, aside, verticals);
+    return given_orientation(stage, job, std::move(start));
   }
   if (matches.empty())
     throw AgreedError<InputError>(
@@ -227,12 +227,12 @@ BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
     const Block block = first_images(job.block, job.generations[g]);
     Hasher hasher;
-    hasher.add(algorithm::kOrientation).add(previous).add(images_before).add(job.settings.tracks.min_length);
+    hasher.add(stage.algorithm).add(previous).add(images_before).add(job.settings.tracks.min_length);
     add_to_hash(hasher, job.settings.orientation);
     add_block_values(hasher, block);
     const std::vector<VerifiedPair> pairs = pairs_of_generation(job, matches, job.generations[g], hasher);
     Unit unit;
-    unit.name = unit_name("orient", static_cast<std::int64_t>(g));
+    unit.name = unit_name(stage.folder(), static_cast<std::int64_t>(g));
     unit.fingerprint = hasher.value();
     unit.write = [&](const std::string& path) {
       InitialOrientation grown{grow(state, block), {}, {}};
@@ -241,7 +241,7 @@ BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
         orient_set(job, block, pairs, set, links, grown);
       write_orientation(path, grown);
     };
-    const StageOutcome outcome = run_stage(job, "orientation", {unit});
+    const StageOutcome outcome = run_stage(job, stage, {unit});
     if (!outcome.failures.empty())
       throw AgreedError<ComputeError>("orientation failed: " + outcome.failures.front().reason);
     const InitialOrientation done = read_orientation(job.store.verified_path(unit.name));
@@ -251,7 +251,7 @@ BlockState run_orientation(Job& job, const std::vector<std::string>& matches) {
     previous = job.store.seal(unit.name)->content_hash;
     images_before = job.generations[g];
   }
-  tell_of_verticals(job, aside, verticals);
+  tell_of_verticals(stage, job, aside, verticals);
   return held_in_place(job, grow(state, job.block));
 }
 

@@ -5,10 +5,11 @@
 #include <vector>
 
 #include "cluster/job/job.h"
+#include "cluster/job/stage.h"
 
 namespace megablock {
 
 // Collective. Returns the state of the block.
-BlockState run_orientation(Job& job, const std::vector<std::string>& matches);
+BlockState run_orientation(const Stage& stage, Job& job, const std::vector<std::string>& matches);
 
 }  // namespace megablock

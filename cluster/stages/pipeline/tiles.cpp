@@ -7,7 +7,6 @@
 #include "cluster/mpi/collective.h"
 #include "cluster/process/process_memory.h"
 #include "cluster/stages/common/growth.h"
-#include "cluster/stages/common/units.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
 #include "io/store/units/graph_files.h"
@@ -35,26 +34,26 @@ Tiles grow_tiles(const Job& job, LinkWeights links) {
   return tiles;
 }
 
-Tiles run_tiles_unit(Job& job, std::uint64_t inputs, const std::function<LinkWeights()>& links) {
+Tiles run_tiles_unit(const Stage& stage, Job& job, std::uint64_t inputs, const std::function<LinkWeights()>& links) {
   Hasher hasher;
-  hasher.add(algorithm::kTiles).add(inputs).add(job.generations);
+  hasher.add(stage.algorithm).add(inputs).add(job.generations);
   add_to_hash(hasher, job.settings.tiles);
   for (const Image& image : job.block.images) hasher.add(image.frame.value);
   Unit unit;
-  unit.name = "tiles.h5";
+  unit.name = stage.makes;
   unit.fingerprint = hasher.value();
   unit.write = [&](const std::string& path) { write_tiles(path, grow_tiles(job, links())); };
-  const StageOutcome outcome = run_stage(job, "tiles", {unit});
+  const StageOutcome outcome = run_stage(job, stage, {unit});
   if (!outcome.failures.empty()) throw AgreedError<ComputeError>("tiles failed: " + outcome.failures.front().reason);
   return read_tiles(job.store.verified_path(unit.name));
 }
 
 }  // namespace
 
-Tiles run_tiles(Job& job, const std::vector<std::string>& matches) {
+Tiles run_tiles(const Stage& stage, Job& job, const std::vector<std::string>& matches) {
   Hasher hasher;
   for (const std::string& name : matches) hasher.add(job.store.seal(name)->content_hash);
-  return run_tiles_unit(job, hasher.value(), [&] {
+  return run_tiles_unit(stage, job, hasher.value(), [&] {
     LinkWeights links;
     for (const std::string& name : matches)
       for (const VerifiedPair& pair : read_matches(job.store.verified_path(name)))
@@ -64,8 +63,8 @@ Tiles run_tiles(Job& job, const std::vector<std::string>& matches) {
   });
 }
 
-Tiles run_tiles_of_tracks(Job& job, const std::string& tie_points) {
-  return run_tiles_unit(job, hash_file(tie_points), [&] {
+Tiles run_tiles_of_tracks(const Stage& stage, Job& job, const std::string& tie_points) {
+  return run_tiles_unit(stage, job, hash_file(tie_points), [&] {
     LinkWeights links;
     std::vector<FrameIndex> frames;
     const auto add_tracks = [&](const TrackSet& tracks) {

@@ -5,12 +5,13 @@
 #include <vector>
 
 #include "cluster/job/job.h"
+#include "cluster/job/stage.h"
 #include "io/block/image_graph.h"
 
 namespace megablock {
 
 // Collective. Works from verified matches, or from given tracks.
-Tiles run_tiles(Job& job, const std::vector<std::string>& matches);
-Tiles run_tiles_of_tracks(Job& job, const std::string& tie_points);
+Tiles run_tiles(const Stage& stage, Job& job, const std::vector<std::string>& matches);
+Tiles run_tiles_of_tracks(const Stage& stage, Job& job, const std::string& tie_points);
 
 }  // namespace megablock

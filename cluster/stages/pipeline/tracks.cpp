@@ -42,9 +42,9 @@ std::int64_t track_key(ImageIndex image, std::int32_t feature) { return (image.v
 // A source of tracks: it calls its argument with the tracks of tile 0, 1, ... in turn.
 using TracksByTile = std::function<void(const std::function<void(const TrackSet&)>&)>;
 
-std::uint64_t content_fingerprint(const TrackSet& tracks) {
+std::uint64_t content_fingerprint(const Stage& stage, const TrackSet& tracks) {
   Hasher hasher;
-  hasher.add(algorithm::kTracks).add(tracks.id).add(tracks.begin).add(tracks.image).add(tracks.x).add(tracks.y);
+  hasher.add(stage.algorithm).add(tracks.id).add(tracks.begin).add(tracks.image).add(tracks.x).add(tracks.y);
   hasher.add(tracks.feature);
   return hasher.value();
 }
@@ -62,20 +62,20 @@ bool index_holds(const Job& job, const std::string& index, const std::vector<std
   return true;
 }
 
-std::vector<std::string> run_tracks_unit(Job& job, std::uint64_t inputs, const Tiles& tiles,
+std::vector<std::string> run_tracks_unit(const Stage& stage, Job& job, std::uint64_t inputs, const Tiles& tiles,
                                          const TracksByTile& tracks_by_tile) {
   Hasher hasher;
-  hasher.add(algorithm::kTracks).add(inputs).add(job.store.seal("tiles.h5")->content_hash);
+  hasher.add(stage.algorithm).add(inputs).add(job.store.seal("tiles.h5")->content_hash);
   Unit unit;
-  unit.name = "tracks/index.txt";
+  unit.name = kTrackList;
   unit.fingerprint = hasher.value();
   std::vector<std::string> names;
-  for (std::int64_t t = 0; t < tiles.tile_count; ++t) names.push_back(unit_name("tracks", t));
+  for (std::int64_t t = 0; t < tiles.tile_count; ++t) names.push_back(unit_name(stage.folder(), t));
   unit.write = [&](const std::string& path) {
     std::ofstream out(path);
     std::size_t t = 0;
     tracks_by_tile([&](const TrackSet& tracks) {
-      const std::uint64_t fingerprint = content_fingerprint(tracks);
+      const std::uint64_t fingerprint = content_fingerprint(stage, tracks);
       if (!is_current(job, names[t], fingerprint))
         job.store.write(names[t], fingerprint, [&](const std::string& p) { write_tracks(p, tracks); });
       out << names[t++] << ' ' << hex(fingerprint) << '\n';
@@ -84,7 +84,7 @@ std::vector<std::string> run_tracks_unit(Job& job, std::uint64_t inputs, const T
   };
   if (job.is_first_rank() && !index_holds(job, unit.name, names)) job.store.remove(unit.name);
   job.ranks.barrier();
-  run_stage(job, "tracks", {unit});
+  run_stage(job, stage, {unit});
   if (!job.store.seal(unit.name))
     throw AgreedError<ComputeError>("no tracks could be built: " + job.failures.back().reason);
   return names;
@@ -147,7 +147,7 @@ void append_track(const Track& track, TrackSet& tracks) {
 }
 
 std::vector<ImageFeatures> shard_keypoints(const Job& job, std::int64_t shard) {
-  return read_keypoints(job.store.verified_path(unit_name("features", shard)));
+  return read_keypoints(job.store.verified_path(feature_unit(shard)));
 }
 
 // Fills in the positions of the observations in the images of one shard: rows [first, last) of `order`.
@@ -158,7 +158,7 @@ void measure(const Job& job, std::int64_t shard, const std::int64_t* first, cons
     const auto image = static_cast<std::size_t>(tracks.image[static_cast<std::size_t>(*row)].value % kShardImages);
     const std::int32_t feature = tracks.feature[static_cast<std::size_t>(*row)];
     if (image >= features.size() || static_cast<std::size_t>(feature) >= features[image].keypoints.size())
-      throw StoreError(unit_name("features", shard) + ": feature " + std::to_string(feature) +
+      throw StoreError(feature_unit(shard) + ": feature " + std::to_string(feature) +
                        " is missing, which a match names; delete the job's folder 'matches' and run it again");
   }
   const bool remove = job.settings.tracks.remove_eccentricity;
@@ -223,18 +223,20 @@ IndexedVector<ImageIndex, std::vector<Keypoint>> read_keypoints(const Job& job) 
   return keypoints;
 }
 
-std::vector<std::string> run_tracks(Job& job, const std::vector<std::string>& matches, const Tiles& tiles) {
+std::vector<std::string> run_tracks(const Stage& stage, Job& job, const std::vector<std::string>& matches,
+                                    const Tiles& tiles) {
   Hasher hasher;
   hasher.add(job.settings.tracks.min_length).add(job.generations).add(job.settings.tracks.remove_eccentricity);
   if (job.settings.tracks.remove_eccentricity)
     for (const Camera& camera : job.block.cameras) add_to_hash(hasher, camera.intrinsics);
   for (const std::string& name : matches) hasher.add(job.store.seal(name)->content_hash);
-  return run_tracks_unit(job, hasher.value(), tiles,
+  return run_tracks_unit(stage, job, hasher.value(), tiles,
                          [&](const auto& take) { build_tracks_by_tile(job, matches, tiles, take); });
 }
 
-std::vector<std::string> run_given_tracks(Job& job, const std::string& tie_points, const Tiles& tiles) {
-  return run_tracks_unit(job, hash_file(tie_points), tiles, [&](const auto& take) {
+std::vector<std::string> run_given_tracks(const Stage& stage, Job& job, const std::string& tie_points,
+                                          const Tiles& tiles) {
+  return run_tracks_unit(stage, job, hash_file(tie_points), tiles, [&](const auto& take) {
     deal_given_tracks(tie_points, job.block, tiles, job.store.path("scratch/tracks"), take,
                       [&job] { job.tables.release(); });
   });

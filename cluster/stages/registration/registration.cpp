@@ -131,7 +131,7 @@ std::string run_rig(Job& job, LazyTracks& tracks, const RegistrationSettings& se
   unit.write = [&](const std::string& path) {
     write_adjustment(path, rig_file_of(estimate_rig(job.block, trajectory.input, tracks().tracks(), options)));
   };
-  run_stage(job, "rig", {unit});
+  run_stage(job, {.name = "rig"}, {unit});
   if (!job.store.seal(kRig)) return "as given: " + job.failures.back().reason;
   const TileAdjustment file = read_adjustment(job.store.verified_path(kRig));
   for (std::size_t c = 0; c < file.cameras.size(); ++c)
@@ -187,7 +187,7 @@ std::vector<Place> run_places(Job& job, const Trajectory& trajectory, const Regi
     write_places(path, choose_places(positions, trajectory.input.pass, panorama_graph(positions, settings.places),
                                      settings.places));
   };
-  run_stage(job, "places", {unit});
+  run_stage(job, {.name = "places"}, {unit});
   return read_places(job.store.verified_path(kPlaces));
 }
 
@@ -232,7 +232,7 @@ Registrations run_registrations(Job& job, LazyTracks& tracks, const Trajectory& 
     };
     units.push_back(std::move(unit));
   }
-  run_stage(job, "registrations", units);
+  run_stage(job, {.name = "registrations"}, units);
   Registrations all;
   Hasher hasher;
   for (const Unit& unit : units) {
@@ -296,7 +296,7 @@ RegisteredTrajectory run_trajectory(Job& job, const Trajectory& trajectory, cons
   unit.write = [&](const std::string& path) {
     write_trajectory(path, adjust_trajectory(job, trajectory, registrations.rows, settings));
   };
-  run_stage(job, "trajectory", {unit});
+  run_stage(job, {.name = "trajectory"}, {unit});
   if (!job.store.seal(kTrajectory))
     throw AgreedError<ComputeError>("the trajectory could not be adjusted: " + job.failures.back().reason);
   return read_trajectory(job.store.verified_path(kTrajectory));

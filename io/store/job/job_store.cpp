@@ -193,9 +193,8 @@ JobStore::JobStore(std::string directory) : directory_(std::move(directory)) {}
 
 std::string JobStore::path(const std::string& unit) const { return (fs::path(directory_) / unit).string(); }
 
-void JobStore::create() const {
-  for (const char* folder : {"", "features", "matches", "tracks", "adjust", "merge", "result", "events"})
-    make_folder(fs::absolute(path(folder)).string());
+void JobStore::create() const {  // the folder of a stage comes with its first file
+  for (const char* folder : {"", "result", "events"}) make_folder(fs::absolute(path(folder)).string());
 }
 
 std::optional<UnitSeal> JobStore::seal(const std::string& unit) const {

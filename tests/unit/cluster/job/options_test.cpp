@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "cluster/job/job_options.h"
+#include "cluster/job/option_section.h"
 #include "io/base/error.h"
 
 namespace megablock {

@@ -12,8 +12,11 @@
 namespace megablock {
 namespace {
 
-const std::vector<ExpectedStage> kExpected = {
-    {"tiles", false}, {"tracks", false}, {"orientation", true}, {"adjustment", false}, {"merge", false}};
+const std::vector<Stage> kExpected = {{.name = "tiles"},
+                                      {.name = "tracks"},
+                                      {.name = "orientation", .optional = true},
+                                      {.name = "adjustment"},
+                                      {.name = "merge"}};
 
 class StageRecordTest : public testing::Test {
  protected:

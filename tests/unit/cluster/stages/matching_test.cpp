@@ -105,7 +105,8 @@ CellMatches matches_of(const Block& block, const std::vector<ImageFeatures>& fea
           .not_oriented = {},
           .notes = {}};
   job.settings.matching.by_turn = by_turn;
-  const std::vector<std::string> names = run_matching(job, {std::vector<std::uint64_t>(kImages, 7), {shard}}, graph);
+  const std::vector<std::string> names =
+      run_matching(*find_stage("matching"), job, {std::vector<std::uint64_t>(kImages, 7), {shard}}, graph);
   const UnitSeal seal = store.seal(names.at(0)).value();
   return {seal.fingerprint, seal.content_hash, read_all_matches(job, names)};
 }

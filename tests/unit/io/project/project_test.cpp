@@ -44,9 +44,14 @@ void write_line(const ScratchDirectory& folder, int count = 5) {
                      joined(kDji, gps_tags(46.84, -91.99 + 0.001 * i, 250)));
 }
 
+// The sections of a program whose first three need images.
+const std::vector<SettingsSection> kSections = {
+    {"features", "", true}, {"candidates", "", true},  {"matching", "filter_model", true},
+    {"tiles", "", false},   {"adjustment", "", false}, {"merge", "", false}};
+
 Project read_text(const ScratchDirectory& folder, const std::string& text) {
   write_file(folder.path("block.yaml"), text);
-  return read_project(folder.path("block.yaml"));
+  return read_project(folder.path("block.yaml"), kSections);
 }
 
 // The message without the path of the folder.
@@ -124,7 +129,7 @@ TEST(Project, GpsOptionsAndOriginOverride) {
     EXPECT_TRUE(held(*f.position_prior));
   // A running job's ground frame wins over both.
   const GroundFrame running{true, 46.9, -92, 0, "EPSG:4979"};
-  EXPECT_EQ(read_project(folder.path("block.yaml"), running).block.ground.latitude_deg, 46.9);
+  EXPECT_EQ(read_project(folder.path("block.yaml"), {}, running).block.ground.latitude_deg, 46.9);
 }
 
 TEST(Project, AccuracyInTheHeaderGivesTheSigmas) {
@@ -286,6 +291,10 @@ TEST(Project, StageSectionsKeepFileAndLine) {
   EXPECT_EQ(entry.section + "." + entry.key + "=" + entry.value, "features.max_features=4000");
   EXPECT_EQ(entry.where, folder.path("block.yaml") + std::string(":3"));
   EXPECT_EQ(project.settings.entries[1].where, folder.path("block.yaml") + std::string(":4"));
+  write_file(folder.path("filter.yaml"), "");
+  EXPECT_EQ(read_text(folder, "images: images\nmatching: {filter_model: filter.yaml}\n").settings.entries[0].value,
+            folder.path("filter.yaml"));
+  EXPECT_THAT(refusal(folder, "images: images\nmaching: {ratio: 0.7}\n"), HasSubstr("did you mean 'matching'?"));
 }
 
 // For the report's list of options: as they were written.

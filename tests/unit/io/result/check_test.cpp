@@ -27,6 +27,14 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
+const std::vector<StageFiles> kStages = {
+    {"features", [](const std::string& path) { read_features(path); }, ""},
+    {"candidates", [](const std::string& path) { read_candidates(path); }, ""},
+    {"matches", [](const std::string& path) { read_matches(path); }, ""},
+    {"tiles", [](const std::string& path) { read_tiles(path); }, ""},
+    {"tracks", [](const std::string& path) { read_tracks(path); }, "tracks"},
+    {"adjustment", [](const std::string& path) { read_adjustment(path); }, "adjust"}};
+
 // A job with a file of every kind.
 class CheckJob : public ::testing::Test {
  protected:
@@ -62,7 +70,7 @@ class CheckJob : public ::testing::Test {
   void put(const std::string& unit, const std::function<void(const std::string&)>& writer) {
     store_.write(unit, 1, writer);
   }
-  std::vector<std::string> problems() const { return check_job(JobStore(store_.directory())); }
+  std::vector<std::string> problems() const { return check_job(JobStore(store_.directory()), kStages); }
 
   ScratchDirectory scratch_;
   JobStore store_{scratch_.path("job")};
@@ -111,7 +119,7 @@ TEST_F(CheckJob, BadJobFileIsNamed) {
 
 TEST_F(CheckJob, NoJobIsBadInput) {
   const auto refusal = [&](const std::string& path) {
-    return fixture::message_of<InputError>([&] { check_job(JobStore(scratch_.path(path))); });
+    return fixture::message_of<InputError>([&] { check_job(JobStore(scratch_.path(path)), {}); });
   };
   EXPECT_THAT(refusal("nowhere"), HasSubstr("nowhere: no such job directory; check the path"));
   std::filesystem::create_directories(scratch_.path("project"));
