@@ -11,6 +11,7 @@
 #include "cluster/stages/merge/merge.h"
 #include "cluster/stages/pipeline/adjustment.h"
 #include "cluster/stages/pipeline/candidates.h"
+#include "cluster/stages/pipeline/coverage.h"
 #include "cluster/stages/pipeline/matching.h"
 #include "cluster/stages/pipeline/orientation.h"
 #include "cluster/stages/pipeline/tiles.h"
@@ -51,6 +52,8 @@ void tracks(const Stage& stage, Job& job, StageResults& results) {
         "no two images could be matched: nothing to orient; check overlap, masks and the match options");
   index_measurements(job, results.tracks);
 }
+
+void coverage(const Stage& stage, Job& job, StageResults& results) { run_coverage(stage, job, results.tracks); }
 
 // Whether the report of the orientation may name single images. It does not when all poses are taken from the project.
 bool orients_by_names(const Block& block) {
@@ -124,12 +127,19 @@ constexpr Stage kStages[] = {
      .makes = "tracks/<tile>.h5",
      .unit = "block",
      .algorithm = 3,
-     .command = "match",
-     .command_given = "match",
-     .help = "Run as far as matches, tiles and tracks",
+     .command_given = "",
      .kind = "tracks",
      .read_file = [](const std::string& path) { read_tracks(path); },
      .run = tracks},
+    {.name = "coverage",
+     .needs = "tracks",
+     .makes = "coverage/<tile>.txt",
+     .unit = "tile",
+     .command = "match",
+     .command_given = "match",
+     .help = "Run as far as matches, tiles, tracks and their coverage",
+     .sections = {&kCoverageSection},
+     .run = coverage},
     {.name = "orientation",
      .needs = "features, matching, where poses are not given",
      .makes = "orient/<generation>.h5",

@@ -5,6 +5,7 @@ changes.
 usage: growth.py MEGABLOCK [unittest arguments]
 Works on a rendered block of four tiles; needs nothing but the program and the standard library (and mpirun, if there).
 """
+import collections
 import csv
 import os
 import pathlib
@@ -17,6 +18,7 @@ import unittest
 from program import MEGABLOCK, events, megablock, status
 
 work = pathlib.Path(tempfile.mkdtemp(prefix="megablock-growth-"))
+WIDTH, HEIGHT = 400, 300  # px
 ADDED = ["f000000.jpg", "f000005.jpg"]  # corners of the block, so that one lies far from some of the tiles
 
 
@@ -50,7 +52,7 @@ def add_image(folder, name):
 
 def simulate(frames, name, *options):
     megablock("simulate", "--rendered", "--frames", frames, "--forward-overlap", 0.7, "--side-overlap", 0.45,
-              "--width", 400, "--image-height", 300, "--focal", 312, *options, "-o", work / name)
+              "--width", WIDTH, "--image-height", HEIGHT, "--focal", 312, *options, "-o", work / name)
 
 
 OPTIONS = {"features": {"max_features": 1000}, "tiles": {"min_tiles": 4, "min_tiles_from": 20}}
@@ -99,6 +101,8 @@ class Growth(unittest.TestCase):
             self.assertEqual(changed_tracks, [f"tracks/{int(tile):06}.h5" for tile in sorted(seen, key=int)])
             self.assertLess(len(changed_tracks), status(self.folder / "job")["tiles"])
             self.assertEqual(sorted(units["adjustment"]), sorted(f.replace("tracks", "adjust") for f in changed_tracks))
+            self.assertEqual(sorted(units["coverage"]),
+                             [f.replace("tracks", "coverage").replace(".h5", ".txt") for f in changed_tracks])
             self.assertIn("result/block.h5", units["merge"])
             self.assertEqual(units["candidates"] + units["tiles"] + units["tracks"],
                              ["graph.h5", "tiles.h5", "tracks/index.txt"])
@@ -114,6 +118,7 @@ class Growth(unittest.TestCase):
         job = self.folder / "job"
         images = sorted(path.name for path in (self.folder / "images").glob("*.jpg"))
         by_image = {image: measurements(job, "--image", image) for image in images}
+        self.check_coverage(by_image)
         self.assertTrue(all(row["image"] == image for image, rows in by_image.items() for row in rows))
         self.assertGreater(len(by_image[added]), 20)
         self.assertEqual(by_image[added], measurements(job, "--frame", added))
@@ -127,6 +132,19 @@ class Growth(unittest.TestCase):
         self.assertGreater(len(points), 0.9 * len(tracks))  # the others have no position
         self.assertEqual(measurements(job, *(word for image in images for word in ("--image", image))),
                          [row for image in sorted(images, key=self.index_of) for row in by_image[image]])
+
+    def check_coverage(self, by_image):
+        """The table of the coverage says what the measurements by image say."""
+        with (self.folder / "job/result/coverage.csv").open() as file:
+            table = {row["image"]: row for row in csv.DictReader(file)}
+        self.assertEqual(set(table), set(by_image))
+        seen_by = collections.Counter(row["track"] for rows in by_image.values() for row in rows)
+        for image, rows in by_image.items():
+            cells = {(int(4 * float(row["x_px"]) / WIDTH), int(4 * float(row["y_px"]) / HEIGHT)) for row in rows}
+            images = sum(seen_by[row["track"]] for row in rows) / len(rows)
+            self.assertEqual(int(table[image]["observations"]), len(rows))
+            self.assertAlmostEqual(float(table[image]["covered_share"]), len(cells) / 16, places=4)
+            self.assertAlmostEqual(float(table[image]["images_per_point"]), images, delta=0.006)
 
     def index_of(self, image):
         return (image in ADDED and 1 + ADDED.index(image), image)  # later images have later indices
@@ -179,12 +197,14 @@ class Growth(unittest.TestCase):
                 ("adjustment", "max_residual_sigmas", 3.5, {"adjustment", "merge"}, set()),
                 ("adjustment", "image_sigma_px", 0.4, {"orientation", "adjustment", "merge"}, set()),
                 ("orientation", "max_rotation_error_deg", 8, {"orientation"}, {"adjustment", "merge"}),
-                ("tiles", "weak_link_tracks", 9, {"tiles"}, {"tracks", "adjustment", "merge"}),
-                ("matching", "remove_eccentricity", "false", {"tracks", "adjustment", "merge"}, {"orientation"}),
-                ("matching", "min_track_length", 3, {"tracks", "orientation", "adjustment", "merge"}, set()),
-                ("matching", "ratio", 0.8, {"matching", "tiles", "tracks", "orientation", "adjustment", "merge"}, set()),
+                ("tiles", "weak_link_tracks", 9, {"tiles"}, {"tracks", "coverage", "adjustment", "merge"}),
+                ("matching", "remove_eccentricity", "false", {"tracks", "coverage", "adjustment", "merge"}, {"orientation"}),
+                ("coverage", "min_share", 0.9, set(), set()),
+                ("matching", "min_track_length", 3, {"tracks", "orientation", "adjustment", "merge"}, {"coverage"}),
+                ("matching", "ratio", 0.8,
+                 {"matching", "tiles", "tracks", "coverage", "orientation", "adjustment", "merge"}, set()),
                 ("candidates", "order_neighbours", 3, {"candidates"},
-                 {"matching", "tiles", "tracks", "orientation", "adjustment", "merge"})):
+                 {"matching", "tiles", "tracks", "coverage", "orientation", "adjustment", "merge"})):
             with self.subTest(option=f"{section}.{key}"):
                 options.setdefault(section, {})[key] = value
                 write_project(self.folder, options)
