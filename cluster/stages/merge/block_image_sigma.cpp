@@ -23,7 +23,7 @@ std::int64_t orientation_unknowns(const Block& block, const BlockState& state) {
 }
 
 // Sums the residuals in tile order, so that the bits do not depend on the ranks.
-ImageResiduals block_image_residuals(Job& job, TileStore& own, std::size_t tile_count) {
+ImageResiduals block_image_residuals(const Job& job, TileStore& own, std::size_t tile_count) {
   std::vector<ImageResiduals> residuals;  // [own]
   for (std::size_t row = 0; row < own.size(); ++row) {
     const RankTile& tile = own.whole(row);
@@ -51,7 +51,7 @@ double start_image_sigma(const Job& job, const std::vector<std::string>& adjuste
   return weight > 0 ? std::sqrt(sum / weight) : options.observations.image_sigma_px;
 }
 
-bool adopt_image_sigma(Job& job, TileStore& own, std::size_t tile_count, const BlockState& oriented) {
+bool adopt_image_sigma(const Job& job, TileStore& own, std::size_t tile_count, const BlockState& oriented) {
   constexpr double kSettled = 0.02;
   if (!job.settings.adjustment.estimate_image_sigma) return false;
   const auto sigma =
@@ -66,7 +66,7 @@ bool adopt_image_sigma(Job& job, TileStore& own, std::size_t tile_count, const B
   return job.ranks.any(changed);
 }
 
-double common_image_sigma(Job& job, const TileStore& own) {
+double common_image_sigma(const Job& job, const TileStore& own) {
   ByteWriter writer;
   writer.value(own.size() == 0 ? 0.0 : own.outline(0).problem.image_sigma_px);
   double sigma = 0;

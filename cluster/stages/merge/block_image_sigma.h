@@ -17,9 +17,9 @@ double start_image_sigma(const Job& job, const std::vector<std::string>& adjuste
 // Collective, at a solution. Estimates the sigma of the block, and gives it to the tiles of this rank when it differs
 // so much that another adjustment is worth while. The answer is the same on every rank. `oriented` tells which frames
 // are unknowns.
-bool adopt_image_sigma(Job& job, TileStore& own, std::size_t tile_count, const BlockState& oriented);
+bool adopt_image_sigma(const Job& job, TileStore& own, std::size_t tile_count, const BlockState& oriented);
 
 // Collective. The sigma with which the tiles were adjusted, also on ranks without tiles.
-double common_image_sigma(Job& job, const TileStore& own);
+double common_image_sigma(const Job& job, const TileStore& own);
 
 }  // namespace megablock

@@ -101,7 +101,7 @@ std::string covariance_path(const Job& job, std::int64_t tile) {
   return job.store.path("merge/parts/" + std::to_string(tile) + ".covariances");
 }
 
-void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
+void find_posterior(const Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
                     MergeTreeRunner& runner, Adjusted& adjusted) {
   std::filesystem::create_directories(job.store.path("merge/parts"));
   adjusted.posterior = runner.posterior([&](const RankTile& tile, const TileCovariance& covariance) {
@@ -118,7 +118,7 @@ void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<Motio
   });
 }
 
-std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size_t tile_count) {
+std::vector<TilePart> gather_parts(const Job& job, const Adjusted& adjusted, std::size_t tile_count) {
   return gather_by_tile(job.ranks, tile_count, adjusted.parts, [&](std::size_t i) { return adjusted.parts[i].tile; });
 }
 

@@ -47,11 +47,11 @@ std::string covariance_path(const Job& job, std::int64_t tile);
 
 // Collective. Computes the covariances at the solution and writes each tile's part of the result. `references` are
 // those of the block's components.
-void find_posterior(Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
+void find_posterior(const Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
                     MergeTreeRunner& runner, Adjusted& adjusted);
 
 // Collective. The parts of all tiles, on every rank.
-std::vector<TilePart> gather_parts(Job& job, const Adjusted& adjusted, std::size_t tile_count);
+std::vector<TilePart> gather_parts(const Job& job, const Adjusted& adjusted, std::size_t tile_count);
 
 // Names the parts of the orientation that only attitude priors determine (common_motion.h), one line for each case and
 // part of the block.

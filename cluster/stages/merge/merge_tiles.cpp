@@ -32,7 +32,8 @@ void load_own_tiles(const Job& job, const MergeInputs& inputs, const MergeStart&
   }
 }
 
-BlockState gather_state(Job& job, const BlockState& start, const TileStore& tiles, const MergeTreeRunner& runner) {
+BlockState gather_state(const Job& job, const BlockState& start, const TileStore& tiles,
+                        const MergeTreeRunner& runner) {
   ByteWriter writer;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const RankTile& tile = tiles.outline(i);
@@ -106,7 +107,7 @@ bool adopt_sigma_scales(MergeTreeRunner& runner, TileStore& tiles, SigmaScales& 
   return true;
 }
 
-std::int64_t screen(Job& job, TileStore& tiles) {
+std::int64_t screen(const Job& job, TileStore& tiles) {
   std::int64_t changed = 0;
   for (std::size_t row = 0; row < tiles.size(); ++row)
     tiles.change(row, [&](RankTile& tile) {
@@ -158,7 +159,7 @@ std::map<std::string, double> MergeCosts::figures() const {
           {"front_operations", fronts.operations}};
 }
 
-MergeCosts gather_costs(Job& job, const TileStore& tiles, const MergeTreeRunner& runner) {
+MergeCosts gather_costs(const Job& job, const TileStore& tiles, const MergeTreeRunner& runner) {
   ByteWriter writer;
   writer.value(runner.memory());
   writer.value(runner.seconds());

@@ -29,7 +29,7 @@ void load_own_tiles(const Job& job, const MergeInputs& inputs, const MergeStart&
 
 // Collective. The state of the block from the tiles of all ranks. Tiles hold the same bits of the unknowns that they
 // share, so that their order does not matter.
-BlockState gather_state(Job& job, const BlockState& start, const TileStore& tiles, const MergeTreeRunner& runner);
+BlockState gather_state(const Job& job, const BlockState& start, const TileStore& tiles, const MergeTreeRunner& runner);
 
 // Gives the present state to every tile, before its observations are tested against it.
 void follow(const BlockState& state, TileStore& tiles);
@@ -40,7 +40,7 @@ bool adopt_sigma_scales(MergeTreeRunner& runner, TileStore& tiles, SigmaScales& 
 
 // Collective. Tests every observation at the solution again. Returns the number of changed decisions in the whole
 // block.
-std::int64_t screen(Job& job, TileStore& tiles);
+std::int64_t screen(const Job& job, TileStore& tiles);
 
 // Folder of this rank in the scratch of the job.
 std::string scratch_folder_of_rank(const Job& job);
@@ -60,7 +60,7 @@ struct MergeCosts {
   std::map<std::string, double> figures() const;  // by name, for the event of the merge
 };
 // Collective.
-MergeCosts gather_costs(Job& job, const TileStore& tiles, const MergeTreeRunner& runner);
+MergeCosts gather_costs(const Job& job, const TileStore& tiles, const MergeTreeRunner& runner);
 // Reports the size of the fronts, the share of the time, and the effect of `--memory`.
 void say_costs(const Job& job, const MergeCosts& costs);
 
