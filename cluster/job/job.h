@@ -1,21 +1,15 @@
-// A run of a job as every stage sees it: the store, the ranks, the options, the block, and the record of the units and
-// failures.
+// A run of a job, as every stage reads it: the store, the ranks, the options, the block. A stage writes what it makes
+// into the store, what it hands on into its results, and what happened into the record of the run (job_record.h).
 #pragma once
 
-#include <map>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "cluster/job/job_options.h"
 #include "cluster/job/paged_tables.h"
-#include "cluster/job/stage_record.h"
 #include "cluster/mpi/communicator.h"
 #include "cluster/process/job_log.h"
-#include "cluster/process/process_memory.h"
 #include "io/block/block.h"
-#include "io/result/result.h"
-#include "io/store/job/events.h"
 #include "io/store/job/job_store.h"
 
 namespace megablock {
@@ -36,22 +30,22 @@ struct RunOptions {
   JobLogOptions log;        // options of the log of each rank
 };
 
+// The block of a run, and its large tables outside of memory. It changes between stages alone: names come and go, the
+// orientation sets verticals aside, `register` puts an estimated rig in, and the merge moves it into the result.
+struct JobBlock {
+  Block block;
+  PagedTables tables;
+};
+
 struct Job {
   RunOptions options;
   Communicator& ranks;
   JobStore store;
   JobOptions settings;
-  EventLog events;
   JobLog log;
-  Block block;
-  std::vector<std::int64_t> generations;           // image counts at which the block grew; the last one is its size
-  std::vector<StageRecord> records;                // of the stages that have begun, in order
-  std::vector<FailedUnit> failures;                // of all stages so far
-  std::map<FrameIndex, std::string> not_oriented;  // frames without a pose from the initial orientation, and why
-  std::vector<std::string> notes;                  // warnings for the report
-  std::int64_t parts_done = 0;                     // finished parts of the present unit (work_queue.h)
-  PeakMemory peak_memory = {};                     // of this rank
-  PagedTables tables = PagedTables(store.directory());  // the large tables of the block
+  const Block& block;                     // of a JobBlock
+  const PagedTables& tables;              // of the same
+  std::vector<std::int64_t> generations;  // image counts at which the block grew; the last is its size
 
   bool is_first_rank() const { return ranks.rank() == 0; }
 };

@@ -29,8 +29,8 @@ void warn(const Job& job, const std::string& stage, const std::string& text) {
   job.log.write(LogLevel::kWarning, stage, "", text);
 }
 
-void add_note(Job& job, const std::string& stage, const std::string& text) {
-  job.notes.push_back(text);
+void add_note(const Job& job, JobRecord& record, const std::string& stage, const std::string& text) {
+  record.notes.push_back(text);
   job.log.write(LogLevel::kWarning, stage, "", text);
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "cluster/job/job.h"
+#include "cluster/job/job_record.h"
 
 namespace megablock {
 
@@ -17,7 +18,7 @@ void warn(const Job& job, const std::string& stage, const std::string& text);
 
 // Gives a warning that the report and `status` list among the notes of the job; the console of the run does not show it.
 // All ranks call it with the same text.
-void add_note(Job& job, const std::string& stage, const std::string& text);
+void add_note(const Job& job, JobRecord& record, const std::string& stage, const std::string& text);
 
 // Warns of a damaged file of the job, which is computed again: "megablock: warning: FILE: PROBLEM; it is computed
 // again". `problem` is the text of JobStore::problem().

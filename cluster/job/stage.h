@@ -17,6 +17,7 @@
 namespace megablock {
 
 struct Job;
+struct JobRecord;     // cluster/job/job_record.h
 struct StageResults;  // cluster/stages/stages.h
 
 struct Stage {
@@ -34,7 +35,8 @@ struct Stage {
   std::array<const OptionSection*, 2> sections = {};     // of the project file; nullptr: none
   const char* kind = nullptr;                            // of its HDF5 files; nullptr: `check` only verifies them
   void (*read_file)(const std::string& path) = nullptr;  // reads a file of this kind; throws what is wrong with it
-  void (*run)(const Stage& stage, Job& job, StageResults& results) = nullptr;  // collective; throws alike on every rank
+  void (*run)(const Stage& stage, const Job& job, JobRecord& record,
+              StageResults& results) = nullptr;  // collective; throws alike on every rank
 
   // Whether it runs in a job that starts from images, or from given tie points.
   bool runs(bool given_tie_points) const { return !given_tie_points || command_given != nullptr; }

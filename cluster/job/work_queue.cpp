@@ -48,7 +48,7 @@ RankRecord from_text(const std::string& text) {
 }
 
 // Computes and writes the unit and its event. A failure is recorded as an event too, and thrown again.
-void compute_unit(Job& job, const std::string& stage, const Unit& unit, double claim_s) {
+void compute_unit(const Job& job, JobRecord& record, const std::string& stage, const Unit& unit, double claim_s) {
   const double start = monotonic_seconds();
   UnitEvent event;
   event.stage = stage;
@@ -58,7 +58,7 @@ void compute_unit(Job& job, const std::string& stage, const Unit& unit, double c
   const auto log = [&] {
     event.seconds = monotonic_seconds() - start;
     event.peak_rss_mib = peak_rss_mib();
-    job.events.append(event);
+    record.events.append(event);
     if (event.failure.empty())
       job.log.write(LogLevel::kDebug, stage, unit.name, fmt::format("done in {:.3f} s", event.seconds));
     else
@@ -76,8 +76,8 @@ void compute_unit(Job& job, const std::string& stage, const Unit& unit, double c
   log();
 }
 
-void write_own_record(const Job& job) {
-  if (job.is_first_rank()) write_record(job.store, job.records.back());
+void write_own_record(const Job& job, const JobRecord& record) {
+  if (job.is_first_rank()) write_record(job.store, record.stages.back());
 }
 
 }  // namespace
@@ -89,37 +89,37 @@ bool is_current(const Job& job, const std::string& unit, std::uint64_t fingerpri
   return current;
 }
 
-void begin_stage(Job& job, const Stage& stage, const std::vector<Unit>& units) {
-  if (job.records.empty() || job.records.back().stage != stage.name)
-    job.records.push_back({stage.name, job.records.empty() ? 0 : job.records.back().hash(), {}, {}});
-  for (const Unit& unit : units) job.records.back().units.emplace_back(unit.name, unit.fingerprint);
-  write_own_record(job);
+void begin_stage(const Job& job, JobRecord& record, const Stage& stage, const std::vector<Unit>& units) {
+  if (record.stages.empty() || record.stages.back().stage != stage.name)
+    record.stages.push_back({stage.name, record.stages.empty() ? 0 : record.stages.back().hash(), {}, {}});
+  for (const Unit& unit : units) record.stages.back().units.emplace_back(unit.name, unit.fingerprint);
+  write_own_record(job, record);
 }
 
-void add_failures(Job& job, const std::vector<FailedUnit>& failures) {
+void add_failures(const Job& job, JobRecord& record, const std::vector<FailedUnit>& failures) {
   if (failures.empty()) return;
-  job.failures.insert(job.failures.end(), failures.begin(), failures.end());
-  auto& recorded = job.records.back().failures;
+  record.failures.insert(record.failures.end(), failures.begin(), failures.end());
+  auto& recorded = record.stages.back().failures;
   recorded.insert(recorded.end(), failures.begin(), failures.end());
-  write_own_record(job);
+  write_own_record(job, record);
   if (job.options.strict)
     throw AgreedError<ComputeError>("stage '" + failures.front().stage + "', " + failures.front().unit + ": " +
                                     failures.front().reason);
 }
 
-void part_done(Job& job, std::int64_t parts) {
-  job.parts_done += parts;
+void part_done(const Job& job, JobRecord& record, std::int64_t parts) {
+  record.parts_done += parts;
   job.ranks.add_done(parts);
 }
 
-StageOutcome run_stage(Job& job, const Stage& row, const std::vector<Unit>& units) {
-  begin_stage(job, row, units);
+StageOutcome run_stage(const Job& job, JobRecord& record, const Stage& row, const std::vector<Unit>& units) {
+  begin_stage(job, record, row, units);
   const std::string stage = row.name;
   const double start_s = monotonic_seconds();
   job.log.write(LogLevel::kInfo, stage, "", "begins: " + counted(std::ssize(units), "unit"));
   return_freed_memory();
   job.tables.release();
-  job.peak_memory.begin_stage();
+  record.peak_memory.begin_stage();
   job.ranks.reset_counter();
   RankRecord mine;
   std::string fatal;  // an error of the run, not of a unit: a full disk, a read-only job
@@ -136,10 +136,10 @@ StageOutcome run_stage(Job& job, const Stage& row, const std::vector<Unit>& unit
       if (number >= static_cast<std::int64_t>(order.size())) break;
       const std::size_t index = order[static_cast<std::size_t>(number)];
       const Unit& unit = units[index];
-      job.parts_done = 0;
+      record.parts_done = 0;
       try {
         if (!is_current(job, unit.name, unit.fingerprint)) {
-          compute_unit(job, stage, unit, claim_s);
+          compute_unit(job, record, stage, unit, claim_s);
           job.tables.release();
           ++mine.computed;
         }
@@ -150,7 +150,7 @@ StageOutcome run_stage(Job& job, const Stage& row, const std::vector<Unit>& unit
         mine.failures.emplace_back(index, error.what());
         if (job.options.strict) job.ranks.use_up_counter();
       }
-      part_done(job, unit.parts - job.parts_done);
+      part_done(job, record, unit.parts - record.parts_done);
     }
     if (stop_requested()) job.ranks.use_up_counter();  // the other ranks stop too, if only this one got the signal
     share_error(job.ranks, 'i', fatal);                // the progress shows the units of the others until they are done
@@ -161,9 +161,9 @@ StageOutcome run_stage(Job& job, const Stage& row, const std::vector<Unit>& unit
   StageOutcome outcome;
   std::vector<std::pair<std::size_t, std::string>> failures;
   for (const std::string& text : job.ranks.gather_all(to_text(mine))) {
-    const RankRecord record = from_text(text);
-    failures.insert(failures.end(), record.failures.begin(), record.failures.end());
-    outcome.computed += record.computed;
+    const RankRecord of_rank = from_text(text);
+    failures.insert(failures.end(), of_rank.failures.begin(), of_rank.failures.end());
+    outcome.computed += of_rank.computed;
   }
   std::sort(failures.begin(), failures.end());
   for (const auto& [index, reason] : failures) outcome.failures.push_back({stage, units[index].name, reason});
@@ -171,7 +171,7 @@ StageOutcome run_stage(Job& job, const Stage& row, const std::vector<Unit>& unit
       LogLevel::kInfo, stage, "",
       fmt::format("ends after {:.3f} s: {} computed by this rank, {} by all, {} failed", monotonic_seconds() - start_s,
                   mine.computed, counted(outcome.computed, "unit"), outcome.failures.size()));
-  add_failures(job, outcome.failures);
+  add_failures(job, record, outcome.failures);
   return outcome;
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "cluster/job/job.h"
+#include "cluster/job/job_record.h"
 #include "cluster/job/stage.h"
 #include "io/result/result.h"
 
@@ -31,18 +32,18 @@ struct StageOutcome {
 
 // Collective. Throws Interrupted on every rank after a graceful stop. With job.options.strict a failed unit ends the
 // run with ComputeError. The units are added to the record of the stage (stage_record.h).
-StageOutcome run_stage(Job& job, const Stage& stage, const std::vector<Unit>& units);
+StageOutcome run_stage(const Job& job, JobRecord& record, const Stage& stage, const std::vector<Unit>& units);
 // Reports finished parts of the present unit. Only one thread at a time may call it.
-void part_done(Job& job, std::int64_t parts = 1);
+void part_done(const Job& job, JobRecord& record, std::int64_t parts = 1);
 
 // Whether the file of a unit exists, is undamaged and was made from the present inputs. A warning names a damaged file.
 bool is_current(const Job& job, const std::string& unit, std::uint64_t fingerprint);
 
 // The first part of run_stage(), for a stage that computes its units in another way: adds the units to the record of
 // the stage, which rank 0 writes.
-void begin_stage(Job& job, const Stage& stage, const std::vector<Unit>& units);
+void begin_stage(const Job& job, JobRecord& record, const Stage& stage, const std::vector<Unit>& units);
 // Adds failures that were found after a stage, such as single images of a unit, to those of the job and to the record
 // of the stage.
-void add_failures(Job& job, const std::vector<FailedUnit>& failures);
+void add_failures(const Job& job, JobRecord& record, const std::vector<FailedUnit>& failures);
 
 }  // namespace megablock

@@ -165,34 +165,39 @@ std::string prepare(const RunOptions& options, const JobStore& store, const JobL
   return text;
 }
 
-int default_threads(const Communicator& ranks) { return std::max(1, host_cores() / ranks.ranks_on_host()); }
+// With the threads and the memory that a rank has unless it is told otherwise.
+RunOptions completed(RunOptions options, const Communicator& ranks) {
+  if (options.threads <= 0) options.threads = std::max(1, host_cores() / ranks.ranks_on_host());
+  if (options.memory_mib <= 0) options.memory_mib = host_memory_mib() / 2 / ranks.ranks_on_host();
+  return options;
+}
 
 // Removes unit files of an earlier state of the block that no stage uses any more (rank 0, when all stages are done).
-void remove_surplus(const Job& job, const std::vector<std::string>& tracks) {
+void remove_surplus(const Job& job, const JobRecord& record, const std::vector<std::string>& tracks) {
   if (!job.is_first_rank()) return;
   std::set<std::string> wanted(tracks.begin(), tracks.end());
-  for (const StageRecord& record : job.records)
-    for (const auto& unit : record.units) wanted.insert(unit.first);
+  for (const StageRecord& stage : record.stages)
+    for (const auto& unit : stage.units) wanted.insert(unit.first);
   for (const std::string& folder : unit_folders())
     for (const std::string& name : job.store.list(folder))
       if (!wanted.contains(name)) job.store.remove(name);
 }
 
 // As far as the command `last` says; empty: all of them. Returns whether the last of all has run.
-bool run_stages(Job& job, const std::string& last, StageResults& results) {
+bool run_stages(const Job& job, JobRecord& record, const std::string& last, StageResults& results) {
   const bool given_tie_points = !results.tie_points.empty();
   for (const Stage& stage : all_stages()) {
     if (!stage.runs(given_tie_points)) continue;
-    stage.run(stage, job, results);
+    stage.run(stage, job, record, results);
     if (stage.ends(last, given_tie_points)) return &stage == &all_stages().back();
   }
   return true;
 }
 
-void run_all(Job& job, const std::string& tie_points) {
-  StageResults results;
+void run_all(const Job& job, JobRecord& record, JobBlock& own, const std::string& tie_points) {
+  StageResults results(own);
   results.tie_points = tie_points;
-  if (run_stages(job, job.options.last_stage, results)) remove_surplus(job, results.tracks);
+  if (run_stages(job, record, job.options.last_stage, results)) remove_surplus(job, record, results.tracks);
 }
 
 // The tracks of all tiles, in the order of their indices.
@@ -214,16 +219,16 @@ TrackSet read_all_tracks(const Job& job, const std::vector<std::string>& units) 
   return all;
 }
 
-TrackSource track_source(Job& job, const std::string& tie_points) {
+TrackSource track_source(const Job& job, JobRecord& record, JobBlock& own, const std::string& tie_points) {
   if (!tie_points.empty()) {
     TrackSource source{tie_points, 0, [&job, tie_points] { return read_given_tracks(tie_points, job.block); }, {}};
     source.fingerprint = std::stoull(on_first_rank(job.ranks, [&] { return std::to_string(hash_file(tie_points)); }));
     return source;
   }
-  StageResults results;
+  StageResults results(own);
   results.needs_tiles = false;
-  run_stages(job, "match", results);
-  restore_names(job);
+  run_stages(job, record, "match", results);
+  restore_names(job.store, own);
   Hasher hasher;
   for (const std::string& unit : results.tracks) hasher.add(job.store.seal(unit)->content_hash);
   return {"", hasher.value(), [&job, tracks = results.tracks] { return read_all_tracks(job, tracks); },
@@ -231,11 +236,14 @@ TrackSource track_source(Job& job, const std::string& tie_points) {
 }
 
 // Prepares the tracks and start poses of a calibration. An off-line calibration needs no matching.
-void calibrate_rigs(Job& job, const std::string& tie_points, const CalibrationSettings& settings) {
+void calibrate_rigs(const Job& job, JobRecord& record, JobBlock& own, const std::string& tie_points,
+                    const CalibrationSettings& settings) {
   const bool targets_alone = settings.rig.mode == CalibrationMode::kOffLine;
-  const TrackSource source = targets_alone ? TrackSource() : track_source(job, tie_points);
-  BlockState start = source.matches.empty() ? initial_state(job.block)
-                                            : run_orientation(*find_stage("orientation"), job, source.matches);
+  const TrackSource source = targets_alone ? TrackSource() : track_source(job, record, own, tie_points);
+  BlockState start =
+      source.matches.empty()
+          ? initial_state(job.block)
+          : run_orientation(*find_stage("orientation"), job, record, source.matches, own.block.verticals).state;
   if (settings.rig.mode != CalibrationMode::kOnLine) resect_missing(job.block, start);
   TrackSet tracks;
   tracks.begin.push_back(0);
@@ -244,7 +252,7 @@ void calibrate_rigs(Job& job, const std::string& tie_points, const CalibrationSe
     throw AgreedError<InputError>(job.options.project +
                                   ": no frame has a pose and none sees three control points; give 'poses' in the "
                                   "project file");
-  run_calibration(job, start, tracks, settings);
+  run_calibration(job, record.notes, start, tracks, settings);
 }
 
 // Opens the log of this rank. A log that cannot be written is reported once and stops nothing.
@@ -256,10 +264,10 @@ JobLog open_log(const RunOptions& options, int rank) {
 }
 
 // Runs the stages. An error that ends the run is written as the last line of the log.
-void run_logged(const Job& job, const std::function<void()>& stages) {
+void run_logged(const Job& job, const JobRecord& record, const std::function<void()>& stages) {
   try {
     stages();
-    job.log.write(LogLevel::kInfo, "", "", "done, " + counted(std::ssize(job.failures), "failed unit"));
+    job.log.write(LogLevel::kInfo, "", "", "done, " + counted(std::ssize(record.failures), "failed unit"));
   } catch (const Interrupted& stop) {
     job.log.write(LogLevel::kInfo, "", "", stop.what());
     throw;
@@ -269,7 +277,7 @@ void run_logged(const Job& job, const std::function<void()>& stages) {
   }
 }
 
-using Stages = std::function<void(Job& job, const std::string& tie_points)>;
+using Stages = std::function<void(const Job& job, JobRecord& record, JobBlock& own, const std::string& tie_points)>;
 
 // Opens the job, runs the stages and returns the exit code.
 int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& stages) {
@@ -293,33 +301,32 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
   if (tie_points.empty())
     keep_freed_memory();  // features of images come next
   else
-    use_memory_sparingly();  // gives back the heap that the preparation has freed, too
-  Job job{.options = run_options,
-          .ranks = ranks,
-          .store = store,
-          .settings = read_options(written.settings()),
-          .events = EventLog(store, ranks.rank()),
-          .log = std::move(log),
-          .block = read_block_without_names(store.verified_path("block.h5")),
-          .generations = written.at<std::vector<std::int64_t>>("generations"),
-          .records = {},
-          .failures = {},
-          .not_oriented = {},
-          .notes = written.at<std::vector<std::string>>("warnings")};
-  page_tables(job.block, job.tables);
-  if (tie_points.empty()) restore_names(job);
-  if (job.options.threads <= 0) job.options.threads = default_threads(ranks);
-  omp_set_num_threads(job.options.threads);  // the default inside tiles
-  if (job.options.memory_mib <= 0) job.options.memory_mib = host_memory_mib() / 2 / ranks.ranks_on_host();
+    use_memory_sparingly();  // the heap, too, that preparing has left
+  JobBlock own{read_block_without_names(store.verified_path("block.h5")), PagedTables(store.directory())};
+  page_tables(own.block, own.tables);
+  if (tie_points.empty()) restore_names(store, own);
+  const Job job{.options = completed(run_options, ranks),
+                .ranks = ranks,
+                .store = store,
+                .settings = read_options(written.settings()),
+                .log = std::move(log),
+                .block = own.block,
+                .tables = own.tables,
+                .generations = written.at<std::vector<std::int64_t>>("generations")};
+  omp_set_num_threads(job.options.threads);  // where no other number is asked for: inside tiles
+  JobRecord record{.events = EventLog(store, ranks.rank()),
+                   .stages = {},
+                   .failures = {},
+                   .notes = written.at<std::vector<std::string>>("warnings")};
   for (const auto& [file, reason] : written.at<std::vector<std::pair<std::string, std::string>>>("unreadable"))
-    job.failures.push_back({"init", file, reason});
+    record.failures.push_back({"init", file, reason});
   job.log.write(LogLevel::kInfo, "", "",
                 fmt::format("{} works on {} as rank {} of {} with {}", kProgram, run_options.project, ranks.rank(),
                             ranks.size(), counted(job.options.threads, "thread")));
-  for (const std::string& warning : job.notes) job.log.write(LogLevel::kWarning, "init", "", warning);
-  run_logged(job, [&] { stages(job, tie_points); });
-  ranks.barrier();  // the lock is held until all ranks are done
-  return job.failures.empty() ? kExitDone : kExitFailedUnits;
+  for (const std::string& warning : record.notes) job.log.write(LogLevel::kWarning, "init", "", warning);
+  run_logged(job, record, [&] { stages(job, record, own, tie_points); });
+  ranks.barrier();  // the lock is held until everybody is done
+  return record.failures.empty() ? kExitDone : kExitFailedUnits;
 }
 
 }  // namespace
@@ -347,26 +354,27 @@ void check_once(Communicator& ranks, const auto& settings) {
 
 int register_job(const RunOptions& options, const RegistrationSettings& settings, Communicator& ranks) {
   check_once(ranks, settings);
-  return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
+  return with_job(options, ranks, [&](const Job& job, JobRecord& record, JobBlock& own, const std::string& tie_points) {
     refuse_environment(job, "register");
-    if (!tie_points.empty()) restore_names(job);
-    const RegistrationSummary summary = run_registration(job, track_source(job, tie_points), settings);
+    if (!tie_points.empty()) restore_names(job.store, own);
+    const TrackSource source = track_source(job, record, own, tie_points);
+    const RegistrationSummary summary = run_registration(job, record, own.block, source, settings);
     if (job.is_first_rank()) std::printf("%s", to_text(summary).c_str());
   });
 }
 
 int calibrate_job(const RunOptions& options, const CalibrationSettings& settings, Communicator& ranks) {
   check_once(ranks, settings.rig);
-  return with_job(options, ranks, [&](Job& job, const std::string& tie_points) {
+  return with_job(options, ranks, [&](const Job& job, JobRecord& record, JobBlock& own, const std::string& tie_points) {
     refuse_environment(job, "calibrate");
     on_first_rank(ranks, [&] {  // before hours of matching
       calibration_block(job.block, settings.rig);
       return std::string();
     });
-    if (!tie_points.empty()) restore_names(job);
-    CalibrationSettings own = settings;
-    own.rig.adjustment = job.settings.adjustment;
-    calibrate_rigs(job, tie_points, own);
+    if (!tie_points.empty()) restore_names(job.store, own);
+    CalibrationSettings with_options = settings;
+    with_options.rig.adjustment = job.settings.adjustment;
+    calibrate_rigs(job, record, own, tie_points, with_options);
   });
 }
 

@@ -27,33 +27,37 @@ namespace megablock {
 
 namespace {
 
-void features(const Stage& stage, Job& job, StageResults& results) { results.features = run_features(stage, job); }
-
-void candidates(const Stage& stage, Job& job, StageResults& results) {
-  results.candidates = run_candidates(stage, job, results.features);
+void features(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
+  results.features = run_features(stage, job, record);
 }
 
-void matching(const Stage& stage, Job& job, StageResults& results) {
-  results.matches = run_matching(stage, job, results.features, results.candidates);
-  release_names(job);
+void candidates(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
+  results.candidates = run_candidates(stage, job, record, results.features);
+}
+
+void matching(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
+  results.matches = run_matching(stage, job, record, results.features, results.candidates);
+  release_names(results.own);
   use_memory_sparingly();
 }
 
-void tiles(const Stage& stage, Job& job, StageResults& results) {
-  results.tiles = results.tie_points.empty() ? run_tiles(stage, job, results.matches)
-                                             : run_tiles_of_tracks(stage, job, results.tie_points);
+void tiles(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
+  results.tiles = results.tie_points.empty() ? run_tiles(stage, job, record, results.matches)
+                                             : run_tiles_of_tracks(stage, job, record, results.tie_points);
 }
 
-void tracks(const Stage& stage, Job& job, StageResults& results) {
-  results.tracks = results.tie_points.empty() ? run_tracks(stage, job, results.matches, results.tiles)
-                                              : run_given_tracks(stage, job, results.tie_points, results.tiles);
+void tracks(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
+  results.tracks = results.tie_points.empty() ? run_tracks(stage, job, record, results.matches, results.tiles)
+                                              : run_given_tracks(stage, job, record, results.tie_points, results.tiles);
   if (results.needs_tiles && results.tiles.tile_count == 0)
     throw AgreedError<ComputeError>(
         "no two images could be matched: nothing to orient; check overlap, masks and the match options");
   index_measurements(job, results.tracks);
 }
 
-void coverage(const Stage& stage, Job& job, StageResults& results) { run_coverage(stage, job, results.tracks); }
+void coverage(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
+  run_coverage(stage, job, record, results.tracks);
+}
 
 // Whether the report of the orientation may name single images. It does not when all poses are taken from the project.
 bool orients_by_names(const Block& block) {
@@ -61,26 +65,27 @@ bool orients_by_names(const Block& block) {
          std::any_of(block.frames.begin(), block.frames.end(), [](const Frame& f) { return !f.given_pose; });
 }
 
-void orientation(const Stage& stage, Job& job, StageResults& results) {
+void orientation(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
   return_freed_memory();  // of the tracks
   job.tables.release();
-  if (orients_by_names(job.block)) restore_names(job);
-  results.oriented = run_orientation(stage, job, results.matches);
-  release_names(job);
+  if (orients_by_names(job.block)) restore_names(job.store, results.own);
+  results.oriented = run_orientation(stage, job, record, results.matches, results.own.block.verticals);
+  release_names(results.own);
   job.tables.release();
-  const auto& oriented = results.oriented.oriented;
+  const auto& oriented = results.oriented.state.oriented;
   if (std::none_of(oriented.begin(), oriented.end(), [](auto o) { return o != 0; }))
     throw AgreedError<ComputeError>(
         "no image could be oriented from the matches; check that images overlap and that focal lengths are right, "
         "leave out wrong GPS positions ('gps: {use: false}'), or give approximate poses ('poses')");
 }
 
-void adjustment(const Stage& stage, Job& job, StageResults& results) {
-  results.adjusted = run_adjustment(stage, job, results.oriented, results.tiles, results.tracks);
+void adjustment(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
+  results.adjusted = run_adjustment(stage, job, record, results.oriented.state, results.tiles, results.tracks);
 }
 
-void merge(const Stage& stage, Job& job, StageResults& results) {
-  run_merge(stage, job, std::move(results.oriented), results.tiles, results.tracks, results.adjusted);
+void merge(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
+  run_merge(stage, job, record, results.own, std::move(results.oriented), results.tiles, results.tracks,
+            results.adjusted);
 }
 
 constexpr Stage kStages[] = {

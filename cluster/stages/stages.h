@@ -5,15 +5,19 @@
 #include <string>
 #include <vector>
 
+#include "cluster/job/job.h"
 #include "cluster/job/stage.h"
 #include "cluster/stages/pipeline/features.h"
-#include "io/block/block.h"
+#include "cluster/stages/pipeline/orientation.h"
 #include "io/block/image_graph.h"
 
 namespace megablock {
 
 // Each member is written once, by the stage that is named; the data themselves stay in the store of the job.
 struct StageResults {
+  explicit StageResults(JobBlock& of_job) : own(of_job) {}
+
+  JobBlock& own;                      // the block of the job: names come and go, orientation and merge take of it
   std::string tie_points;             // file of given tie points, before all stages; empty: the job starts from images
   bool needs_tiles = true;            // before all stages: a block without verified matches ends the run
   FeatureStage features;              // features
@@ -21,7 +25,7 @@ struct StageResults {
   std::vector<std::string> matches;   // matching: units by cell
   Tiles tiles;                        // tiles
   std::vector<std::string> tracks;    // tracks: units by tile
-  BlockState oriented;                // orientation
+  OrientationStage oriented;          // orientation
   std::vector<std::string> adjusted;  // adjustment: units by tile; empty for tiles that could not be adjusted
 };
 

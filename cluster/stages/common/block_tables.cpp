@@ -1,5 +1,6 @@
 #include "cluster/stages/common/block_tables.h"
 
+#include "cluster/process/process_memory.h"
 #include "io/store/units/block_file.h"
 
 namespace megablock {
@@ -20,16 +21,16 @@ void page_tables(const Block& block, PagedTables& tables) {
   tables.put(block.relative_poses);
 }
 
-void release_names(Job& job) {
-  job.tables.forget(job.block.image_names.text());
-  job.tables.forget(job.block.image_names.ends());
-  job.block.image_names = {};
+void release_names(JobBlock& own) {
+  own.tables.forget(own.block.image_names.text());
+  own.tables.forget(own.block.image_names.ends());
+  own.block.image_names = {};
   return_freed_memory();
 }
 
-void restore_names(Job& job) {
-  job.block.image_names = read_image_names(job.store.verified_path("block.h5"));
-  page_names(job.block, job.tables);
+void restore_names(const JobStore& store, JobBlock& own) {
+  own.block.image_names = read_image_names(store.verified_path("block.h5"));
+  page_names(own.block, own.tables);
 }
 
 }  // namespace megablock

@@ -9,7 +9,7 @@ namespace megablock {
 void page_tables(const Block& block, PagedTables& tables);
 
 // Frees the names of images, which tiles, tracks and adjustments do not need. They are a third of that size.
-void release_names(Job& job);
-void restore_names(Job& job);
+void release_names(JobBlock& own);
+void restore_names(const JobStore& store, JobBlock& own);
 
 }  // namespace megablock

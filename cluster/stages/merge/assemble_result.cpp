@@ -42,20 +42,21 @@ void find_boundary(BlockResult& result, const std::vector<TilePart>& parts) {
 }
 
 // Lists the images without a pose, each with its reason.
-void list_failures(const Job& job, BlockResult& result) {
-  result.failures = job.failures;
+void list_failures(const JobRecord& record, const std::map<FrameIndex, std::string>& not_oriented,
+                   BlockResult& result) {
+  result.failures = record.failures;
   std::unordered_set<std::string> told;
-  for (const FailedUnit& failure : job.failures) told.insert(failure.unit);
+  for (const FailedUnit& failure : record.failures) told.insert(failure.unit);
   for (std::size_t i = 0; i < result.block.images.size(); ++i) {
     const ImageIndex image(static_cast<std::int64_t>(i));
     const FrameIndex frame = result.block.images[image].frame;
     if (result.state.oriented[frame]) continue;
     const std::string name = result.block.name_of(image);
     if (told.contains(name)) continue;
-    const auto reason = job.not_oriented.find(frame);
+    const auto reason = not_oriented.find(frame);
     const bool linked = result.tiles.tile_of_frame.contains(frame) && result.tiles.tile_of_frame[frame].valid();
     result.failures.push_back({linked ? "orientation" : "matching", name,
-                               linked && reason != job.not_oriented.end() ? reason->second
+                               linked && reason != not_oriented.end() ? reason->second
                                : linked ? "oriented at first, but too few of its observations hold in the adjustment"
                                         : "no other image shares enough verified matches with it"});
   }
@@ -72,11 +73,13 @@ void scale_covariances(BlockResult& result, double factor) {
 
 }  // namespace
 
-BlockResult assemble_result(Job& job, const Tiles& tiles, MergeOutcome outcome, const std::vector<TilePart>& parts) {
+BlockResult assemble_result(const Job& job, const JobRecord& record, Block& block, const Tiles& tiles,
+                            const std::map<FrameIndex, std::string>& not_oriented, MergeOutcome outcome,
+                            const std::vector<TilePart>& parts) {
   BlockResult result;
-  result.image_records = image_records(job);
+  result.image_records = image_records(job, record);
   result.provenance = provenance_of(job);
-  result.block = std::exchange(job.block, {});
+  result.block = std::exchange(block, {});
   result.state = std::move(outcome.state);
   result.tiles = tiles;
   result.frame_covariance = std::move(outcome.frame_covariance);
@@ -96,8 +99,8 @@ BlockResult assemble_result(Job& job, const Tiles& tiles, MergeOutcome outcome, 
   result.gauge = outcome.gauge;
   result.seams = outcome.seams;
   result.observation_table = outcome.observations;
-  result.notes = job.notes;
-  list_failures(job, result);
+  result.notes = record.notes;
+  list_failures(record, not_oriented, result);
   return result;
 }
 

@@ -60,8 +60,8 @@ int most_rounds(const MergeSettings& settings) {
 
 // Clears the scratch folder of the job. The folder itself stays, because another disk may be mounted there. Folders of
 // this run's ranks stay while the ranks `use` them.
-void clear_scratch(Job& job, bool use) {
-  const std::vector<std::string> kept =  // ranks have removed their own files before they report
+void clear_scratch(const Job& job, bool use) {
+  const std::vector<std::string> kept =  // ranks have removed their own files before they say so
       job.ranks.gather_all(use ? scratch_folder_of_rank(job) : std::string());
   on_first_rank(job.ranks, [&] {
     const std::filesystem::path folder(job.store.path("scratch"));
@@ -99,7 +99,7 @@ void say_iteration(const Job& job, const GlobalState& state, const GlobalOptions
 
 // Loads this rank's tiles from their own adjustments, or from the checkpoint that was found. Returns the state of the
 // block.
-BlockState load_block(Job& job, MergeInputs& inputs, const MergeCheckpoint& checkpoint,
+BlockState load_block(const Job& job, MergeInputs& inputs, const MergeCheckpoint& checkpoint,
                       const std::optional<MergePosition>& found, const std::vector<int>& rank_of_tile,
                       TileStore& tiles) {
   MergeStart start =
@@ -119,7 +119,7 @@ BlockState load_block(Job& job, MergeInputs& inputs, const MergeCheckpoint& chec
   return std::move(start.state);
 }
 
-Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint) {
+Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint) {
   const std::size_t frames = job.block.frames.size();
   const std::vector<MotionReference> references = motion_references(job.block, inputs.tiles);
   job.tables.release();  // frames
@@ -186,7 +186,7 @@ Adjusted adjust_block(Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint
 }
 
 // Collective. The largest of the figures of all ranks.
-double largest(Job& job, double figure) {
+double largest(const Job& job, double figure) {
   for (const std::string& text : job.ranks.gather_all(std::to_string(figure)))
     figure = std::max(figure, std::stod(text));
   return figure;
@@ -201,11 +201,11 @@ std::string shortfall(const Adjusted& adjusted) {
   return "";
 }
 
-void add_shortfall(Job& job, const std::string& reason) {
-  if (!reason.empty()) add_failures(job, {{"merge", kResult, reason}});
+void add_shortfall(const Job& job, JobRecord& record, const std::string& reason) {
+  if (!reason.empty()) add_failures(job, record, {{"merge", kResult, reason}});
 }
 
-std::string shortfall_before(Job& job) {
+std::string shortfall_before(const Job& job) {
   return on_first_rank(job.ranks, [&] {
     const auto record = read_record(job.store, "merge");
     return record && !record->failures.empty() ? record->failures.front().reason : std::string();
@@ -213,63 +213,65 @@ std::string shortfall_before(Job& job) {
 }
 
 // The statistics of all stages; this one's end with `event`.
-std::vector<StageStatistics> statistics_of(const Job& job, UnitEvent event) {
+std::vector<StageStatistics> statistics_of(const Job& job, const JobRecord& record, UnitEvent event) {
   std::vector<UnitEvent> events = read_events(job.store);
   event.time_s = seconds_since_1970();
   events.push_back(event);
   std::vector<StageStatistics> statistics;
-  for (const StageRecord& record : job.records) statistics.push_back(stage_statistics(record, events));
+  for (const StageRecord& stage : record.stages) statistics.push_back(stage_statistics(stage, events));
   return statistics;
 }
 
-void write_final(Job& job, const MergeInputs& inputs, std::uint64_t fingerprint, const Adjusted& adjusted,
-                 const std::string& reason, MergeOutcome outcome, const std::vector<TilePart>& parts,
-                 UnitEvent& event) {
+void write_final(const Job& job, JobRecord& record, JobBlock& own, const MergeInputs& inputs,
+                 const std::map<FrameIndex, std::string>& not_oriented, std::uint64_t fingerprint,
+                 const Adjusted& adjusted, const std::string& reason, MergeOutcome outcome,
+                 const std::vector<TilePart>& parts, UnitEvent& event) {
   if (!reason.empty()) {
-    job.notes.push_back(reason);
+    record.notes.push_back(reason);
     warn(job, "merge", reason);
   }
-  const std::size_t notes_before = job.notes.size();
+  const std::size_t notes_before = record.notes.size();
   for (const SeamCheck& seam : outcome.seams)
-    if (!seam.note.empty()) add_note(job, "merge", seam.note);
+    if (!seam.note.empty()) add_note(job, record, "merge", seam.note);
   for (const std::string& line : describe_disagreements(adjusted.posterior.tile_checks, names_of(job.block)))
-    add_note(job, "merge", line);
-  event.figures["seam_alarms"] = static_cast<double>(job.notes.size() - notes_before);
-  for (const std::string& line : judge_kept(parts)) add_note(job, "merge", line);
+    add_note(job, record, "merge", line);
+  event.figures["seam_alarms"] = static_cast<double>(record.notes.size() - notes_before);
+  for (const std::string& line : judge_kept(parts)) add_note(job, record, "merge", line);
   for (const std::string& line : judge_motions(job.block, inputs.tiles, parts)) {
-    job.notes.push_back(line);
+    record.notes.push_back(line);
     say(job, "merge", line);
   }
   job.tables.release();  // frames
-  BlockResult result = assemble_result(job, inputs.tiles, std::move(outcome), parts);
+  BlockResult result = assemble_result(job, record, own.block, inputs.tiles, not_oriented, std::move(outcome), parts);
   if (!reason.empty()) result.failures.push_back({"merge", kResult, reason});
-  result.stages = statistics_of(job, event);
+  result.stages = statistics_of(job, record, event);
   std::vector<PartTracks::File> files;
   for (const TilePart& part : parts) files.push_back({part_path(job, part.tile), part.track_count});
-  write_result_files(job.store, job.tables, fingerprint, std::move(result), std::move(files), job.settings.diagnostics);
+  write_result_files(job.store, own.tables, fingerprint, std::move(result), std::move(files), job.settings.diagnostics);
 }
 
 }  // namespace
 
-void run_merge(const Stage& stage, Job& job, BlockState oriented, const Tiles& tiles,
-               const std::vector<std::string>& tracks, const std::vector<std::string>& adjusted_units) {
+void run_merge(const Stage& stage, const Job& job, JobRecord& record, JobBlock& own, OrientationStage oriented,
+               const Tiles& tiles, const std::vector<std::string>& tracks,
+               const std::vector<std::string>& adjusted_units) {
   const double start = monotonic_seconds();
   return_freed_memory();
-  job.peak_memory.begin_stage();
-  MergeInputs inputs{std::move(oriented), tiles, tracks, adjusted_units};
+  record.peak_memory.begin_stage();
+  MergeInputs inputs{std::move(oriented.state), tiles, tracks, adjusted_units};
   const std::uint64_t fingerprint = inputs_fingerprint(stage, job, inputs);
   const std::string before = shortfall_before(job);
-  begin_stage(job, stage, {{kResult, fingerprint, 0, nullptr}});
+  begin_stage(job, record, stage, {{kResult, fingerprint, 0, nullptr}});
   const std::string current = on_first_rank(job.ranks, [&]() -> std::string {
     if (!is_current(job, kResult, fingerprint)) return "";
     return std::filesystem::exists(job.store.path(kReportPage)) ? "current" : "";
   });
-  if (!current.empty()) {  // a run that was killed after its result may have left checkpoints
-    if (job.is_first_rank()) MergeCheckpoint(job, fingerprint).clear();
-    return add_shortfall(job, before);
+  if (!current.empty()) {  // a run that was killed behind its result may have left what led to it
+    if (job.is_first_rank()) MergeCheckpoint(job, record.events, fingerprint).clear();
+    return add_shortfall(job, record, before);
   }
 
-  MergeCheckpoint checkpoint(job, fingerprint);
+  MergeCheckpoint checkpoint(job, record.events, fingerprint);
   Adjusted adjusted = adjust_block(job, inputs, checkpoint);
   const std::string reason = shortfall(adjusted);
   return_freed_memory();  // memory of fronts and tiles
@@ -281,22 +283,23 @@ void run_merge(const Stage& stage, Job& job, BlockState oriented, const Tiles& t
   event.peak_rss_mib = largest(job, peak_rss_mib());
   event.figures = adjusted.costs.figures();
   event.figures["tried_steps"] = adjusted.position.tried_steps + adjusted.position.global.iterations;
-  double process_peak_mib = largest(job, job.peak_memory.mib());
+  double process_peak_mib = largest(job, record.peak_memory.mib());
   event.seconds = monotonic_seconds() - start;
   on_first_rank(job.ranks, [&] {
-    restore_names(job);
-    write_final(job, inputs, fingerprint, adjusted, reason, make_outcome(job, adjusted, inputs.tiles), parts, event);
+    restore_names(job.store, own);
+    write_final(job, record, own, inputs, oriented.not_oriented, fingerprint, adjusted, reason,
+                make_outcome(job, adjusted, inputs.tiles), parts, event);
     // The result could not yet contain the peak memory of its own writing.
     event.peak_rss_mib = std::max(event.peak_rss_mib, peak_rss_mib());
-    process_peak_mib = std::max(process_peak_mib, job.peak_memory.mib());
+    process_peak_mib = std::max(process_peak_mib, record.peak_memory.mib());
     event.figures["process_peak_rss_mib"] = process_peak_mib;
     event.seconds = monotonic_seconds() - start;
     event.bytes = static_cast<std::int64_t>(job.store.seal(kResult)->length);
-    job.events.append(event);
+    record.events.append(event);
     checkpoint.clear();
     return std::string();
   });
-  add_shortfall(job, reason);
+  add_shortfall(job, record, reason);
 }
 
 }  // namespace megablock

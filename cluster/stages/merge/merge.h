@@ -5,13 +5,16 @@
 #include <vector>
 
 #include "cluster/job/job.h"
+#include "cluster/job/job_record.h"
 #include "cluster/job/stage.h"
+#include "cluster/stages/pipeline/orientation.h"
 #include "io/block/image_graph.h"
 
 namespace megablock {
 
-// Makes merge/..., result/block.h5 and result/report.html. The block of the job must not be used afterwards.
-void run_merge(const Stage& stage, Job& job, BlockState oriented, const Tiles& tiles,
-               const std::vector<std::string>& tracks, const std::vector<std::string>& adjusted);
+// Merge and result: merge/..., result/block.h5, result/report.html. `own`: the block of the job, not to be used
+// afterwards.
+void run_merge(const Stage& stage, const Job& job, JobRecord& record, JobBlock& own, OrientationStage oriented,
+               const Tiles& tiles, const std::vector<std::string>& tracks, const std::vector<std::string>& adjusted);
 
 }  // namespace megablock

@@ -100,7 +100,7 @@ void MergeCheckpoint::write(const MergePosition& position, TileStore& tiles, con
     event.unit = here;
     event.seconds = monotonic_seconds() - last_s_;
     event.peak_rss_mib = peak_rss_mib();
-    job_.events.append(event);
+    events_.append(event);
     if (!before.empty() && before != here) std::filesystem::remove_all(job_.store.path(before));
     return std::string();
   });

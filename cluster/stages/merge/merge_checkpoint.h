@@ -8,6 +8,7 @@
 #include "adjust/tile/sigma_scales.h"
 #include "cluster/job/job.h"
 #include "cluster/process/progress.h"
+#include "io/store/job/events.h"
 #include "merge/tree/global_adjustment.h"
 #include "merge/tree/merge_tree_runner.h"
 #include "merge/tree/sweep_recorder.h"
@@ -24,7 +25,8 @@ struct MergePosition {
 class MergeCheckpoint {
  public:
   // `inputs` is the fingerprint of everything from which the merge is computed.
-  MergeCheckpoint(Job& job, std::uint64_t inputs) : job_(job), inputs_(inputs) {}
+  MergeCheckpoint(const Job& job, EventLog& events, std::uint64_t inputs)
+      : job_(job), events_(events), inputs_(inputs) {}
 
   // Collective.
   void write(const MergePosition& position, TileStore& tiles, const BlockState& state);
@@ -46,7 +48,8 @@ class MergeCheckpoint {
   std::string folder(const MergePosition& position) const;
   std::uint64_t fingerprint(const std::string& folder) const;
 
-  Job& job_;
+  const Job& job_;
+  EventLog& events_;
   std::uint64_t inputs_;
   std::string current_;                  // folder of the last checkpoint written or found
   double last_s_ = monotonic_seconds();  // when it was written

@@ -179,7 +179,8 @@ std::vector<TileMark> tile_marks(const Stage& stage, const Job& job, const Orien
 
 }  // namespace
 
-std::vector<std::string> run_adjustment(const Stage& stage, Job& job, const BlockState& oriented, const Tiles& tiles,
+std::vector<std::string> run_adjustment(const Stage& stage, const Job& job, JobRecord& record,
+                                        const BlockState& oriented, const Tiles& tiles,
                                         const std::vector<std::string>& tracks) {
   const OrientedTiles from{oriented, tiles, rows_of_tiles(job.block, oriented, tiles)};
   job.tables.release();
@@ -198,7 +199,7 @@ std::vector<std::string> run_adjustment(const Stage& stage, Job& job, const Bloc
     names.push_back(unit.name);
     units.push_back(std::move(unit));
   }
-  const StageOutcome outcome = run_stage(job, stage, units);
+  const StageOutcome outcome = run_stage(job, record, stage, units);
   for (const FailedUnit& failure : outcome.failures) std::erase(names, failure.unit);
   if (names.empty()) throw AgreedError<ComputeError>("no tile could be adjusted: " + outcome.failures.front().reason);
   for (std::size_t t = 0; t < tracks.size(); ++t) {

@@ -43,13 +43,14 @@ void warn_of_lost_frames(const Block& block, const BlockState& start, RigCalibra
                                  "control points, the first of them '" + block.frames[FrameIndex(first)].name + "'");
 }
 
-std::string calibrate(Job& job, const BlockState& start, const TrackSet& tracks, const CalibrationSettings& settings) {
+std::string calibrate(const Job& job, const std::vector<std::string>& notes, const BlockState& start,
+                      const TrackSet& tracks, const CalibrationSettings& settings) {
   std::optional<VerificationSite> site;
   if (!settings.verification.empty()) site = read_site(settings.verification);
   CalibratedRig rig = calibrate_rig(job.block, start, tracks, settings.rig, site);
   RigCalibration& calibration = rig.calibration;
   calibration.project = std::filesystem::path(job.options.project).filename().string();
-  calibration.warnings.insert(calibration.warnings.end(), job.notes.begin(), job.notes.end());
+  calibration.warnings.insert(calibration.warnings.end(), notes.begin(), notes.end());
   warn_of_lost_frames(job.block, start, calibration);
   const std::string name = calibration.refused.empty() ? "calibration.yaml" : "calibration-refused.yaml";
   job.store.write_text(name, calibration_yaml(calibration, kProgram));
@@ -83,8 +84,9 @@ void resect_missing(const Block& block, BlockState& state) {
   }
 }
 
-void run_calibration(Job& job, const BlockState& start, const TrackSet& tracks, const CalibrationSettings& settings) {
-  const std::string refused = on_first_rank(job.ranks, [&] { return calibrate(job, start, tracks, settings); });
+void run_calibration(const Job& job, const std::vector<std::string>& notes, const BlockState& start,
+                     const TrackSet& tracks, const CalibrationSettings& settings) {
+  const std::string refused = on_first_rank(job.ranks, [&] { return calibrate(job, notes, start, tracks, settings); });
   if (!refused.empty()) throw AgreedError<ComputeError>(refused);
 }
 

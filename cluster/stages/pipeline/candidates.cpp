@@ -43,7 +43,7 @@ std::uint64_t candidates_fingerprint(const Stage& stage, const Job& job, const F
 
 }  // namespace
 
-CandidateGraph run_candidates(const Stage& stage, Job& job, const FeatureStage& features) {
+CandidateGraph run_candidates(const Stage& stage, const Job& job, JobRecord& record, const FeatureStage& features) {
   Unit unit;
   unit.name = stage.makes;
   unit.fingerprint = candidates_fingerprint(stage, job, features);
@@ -61,7 +61,7 @@ CandidateGraph run_candidates(const Stage& stage, Job& job, const FeatureStage& 
     }
     write_candidates(path, graph);
   };
-  run_stage(job, stage, {unit});
+  run_stage(job, record, stage, {unit});
   return read_candidates(job.store.verified_path(unit.name));
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cluster/job/job.h"
+#include "cluster/job/job_record.h"
 #include "cluster/job/stage.h"
 #include "cluster/stages/pipeline/features.h"
 #include "io/block/image_graph.h"
@@ -9,6 +10,6 @@
 namespace megablock {
 
 // Collective.
-CandidateGraph run_candidates(const Stage& stage, Job& job, const FeatureStage& features);
+CandidateGraph run_candidates(const Stage& stage, const Job& job, JobRecord& record, const FeatureStage& features);
 
 }  // namespace megablock

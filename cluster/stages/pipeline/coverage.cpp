@@ -129,7 +129,7 @@ std::string coverage_note(const Coverages& coverage, const NameTable<ImageIndex>
                      poor, seen, poor == 1 ? "has" : "have", 100 * min_share, named, kTable);
 }
 
-void run_coverage(const Stage& stage, Job& job, const std::vector<std::string>& tracks) {
+void run_coverage(const Stage& stage, const Job& job, JobRecord& record, const std::vector<std::string>& tracks) {
   const std::uint64_t sizes = hash_sizes(job.block);
   std::vector<Unit> units;
   for (const std::string& track : tracks) {
@@ -143,7 +143,7 @@ void run_coverage(const Stage& stage, Job& job, const std::vector<std::string>& 
     };
     units.push_back(std::move(unit));
   }
-  run_stage(job, stage, units);
+  run_stage(job, record, stage, units);
   const std::string note = on_first_rank(job.ranks, [&] {
     const Coverages coverage = read_units(job, units);
     const NameTable<ImageIndex> names = read_image_names(job.store.verified_path("block.h5"));
@@ -151,7 +151,7 @@ void run_coverage(const Stage& stage, Job& job, const std::vector<std::string>& 
     return coverage_note(coverage, names, job.settings.numbers.at(kMinShare));
   });
   return_freed_memory();
-  if (!note.empty()) add_note(job, stage.name, note);
+  if (!note.empty()) add_note(job, record, stage.name, note);
 }
 
 }  // namespace megablock

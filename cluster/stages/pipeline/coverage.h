@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cluster/job/job.h"
+#include "cluster/job/job_record.h"
 #include "cluster/job/option_section.h"
 #include "cluster/job/stage.h"
 #include "io/block/block.h"
@@ -37,6 +38,6 @@ std::string coverage_note(const IndexedVector<ImageIndex, ImageCoverage>& covera
                           double min_share);
 
 // Collective. `tracks`: units by tile.
-void run_coverage(const Stage& stage, Job& job, const std::vector<std::string>& tracks);
+void run_coverage(const Stage& stage, const Job& job, JobRecord& record, const std::vector<std::string>& tracks);
 
 }  // namespace megablock

@@ -112,10 +112,10 @@ class GrowingShard {
   SaveTimes times_;
 };
 
-void write_shard(Job& job, const Shard& shard, const std::string& path) {
+void write_shard(const Job& job, JobRecord& record, const Shard& shard, const std::string& path) {
   GrowingShard growing(job, shard);
   const std::int64_t kept = growing.kept();
-  part_done(job, kept);
+  part_done(job, record, kept);
   const auto count = static_cast<std::int64_t>(shard.image_fingerprints.size());
   load_image_codecs();
 #pragma omp parallel for schedule(dynamic, 1) num_threads(job.options.threads)
@@ -127,14 +127,14 @@ void write_shard(Job& job, const Shard& shard, const std::string& path) {
     {
       growing.add(i, std::move(features));
       if (omp_get_thread_num() == 0) growing.save_now_and_then();
-      part_done(job);
+      part_done(job, record);
     }
   }
   write_features(path, growing.images());
 }
 
 // Records images without features as failures of the run, with their reasons.
-void list_unreadable(const Stage& stage, Job& job, const FeatureStage& outcome) {
+void list_unreadable(const Stage& stage, const Job& job, JobRecord& record, const FeatureStage& outcome) {
   const std::string text = on_first_rank(job.ranks, [&] {
     nlohmann::json failed = nlohmann::json::array();
     for (const std::string& shard : outcome.shards)
@@ -144,12 +144,12 @@ void list_unreadable(const Stage& stage, Job& job, const FeatureStage& outcome) 
   });
   std::vector<FailedUnit> failures;
   for (const auto& entry : nlohmann::json::parse(text)) failures.push_back({stage.name, entry[0], entry[1]});
-  add_failures(job, failures);
+  add_failures(job, record, failures);
 }
 
 }  // namespace
 
-FeatureStage run_features(const Stage& stage, Job& job) {
+FeatureStage run_features(const Stage& stage, const Job& job, JobRecord& record) {
   FeatureStage made;
   made.image_fingerprint = image_fingerprints(job, stage.algorithm);
   const auto images = static_cast<std::int64_t>(job.block.images.size());
@@ -164,14 +164,14 @@ FeatureStage run_features(const Stage& stage, Job& job) {
     unit.fingerprint = shard_fingerprint(shard.image_fingerprints);
     unit.parts = end - first;
     unit.cost = static_cast<double>(unit.parts);
-    unit.write = [&job, shard](const std::string& path) { write_shard(job, shard, path); };
+    unit.write = [&job, &record, shard](const std::string& path) { write_shard(job, record, shard, path); };
     made.shards.push_back(unit.name);
     units.push_back(std::move(unit));
   }
-  const StageOutcome outcome = run_stage(job, stage, units);
+  const StageOutcome outcome = run_stage(job, record, stage, units);
   if (!outcome.failures.empty())
     throw AgreedError<ComputeError>(std::string(stage.name) + ": " + outcome.failures.front().reason);
-  list_unreadable(stage, job, made);
+  list_unreadable(stage, job, record, made);
   return made;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cluster/job/job.h"
+#include "cluster/job/job_record.h"
 #include "cluster/job/stage.h"
 #include "cluster/stages/common/units.h"
 #include "io/block/features.h"
@@ -18,7 +19,7 @@ struct FeatureStage {
   std::vector<std::uint64_t> image_fingerprint;
   std::vector<std::string> shards;
 };
-FeatureStage run_features(const Stage& stage, Job& job);
+FeatureStage run_features(const Stage& stage, const Job& job, JobRecord& record);
 
 // The unit of a shard, for the stages that read it.
 std::string feature_unit(std::int64_t shard);

@@ -168,8 +168,8 @@ std::vector<VerifiedPair> match_cell(const Job& job, FeatureCache& cache, const 
 
 }  // namespace
 
-std::vector<std::string> run_matching(const Stage& stage, Job& job, const FeatureStage& features,
-                                      const CandidateGraph& graph) {
+std::vector<std::string> run_matching(const Stage& stage, const Job& job, JobRecord& record,
+                                      const FeatureStage& features, const CandidateGraph& graph) {
   constexpr std::size_t kResidentShards = 16;
   FeatureCache cache(job.store, kResidentShards);
   const Knowledge knowledge(job);
@@ -187,7 +187,7 @@ std::vector<std::string> run_matching(const Stage& stage, Job& job, const Featur
     names.push_back(unit.name);
     units.push_back(std::move(unit));
   }
-  run_stage(job, stage, units);
+  run_stage(job, record, stage, units);
   std::erase_if(names, [&](const std::string& name) { return !job.store.seal(name); });
   return names;
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "cluster/job/job.h"
+#include "cluster/job/job_record.h"
 #include "cluster/job/stage.h"
 #include "cluster/stages/pipeline/features.h"
 #include "io/block/image_graph.h"
@@ -12,8 +13,8 @@
 namespace megablock {
 
 // Collective. Returns the unit names.
-std::vector<std::string> run_matching(const Stage& stage, Job& job, const FeatureStage& features,
-                                      const CandidateGraph& graph);
+std::vector<std::string> run_matching(const Stage& stage, const Job& job, JobRecord& record,
+                                      const FeatureStage& features, const CandidateGraph& graph);
 
 // Reads all matches of the units, in the order of the units.
 std::vector<VerifiedPair> read_all_matches(const Job& job, const std::vector<std::string>& matches);

@@ -180,17 +180,19 @@ BlockState held_in_place(const Job& job, BlockState state) {
 }
 
 // Removes these verticals from the block, and adds them to `all`.
-void set_aside(Job& job, const std::vector<SetAsideVertical>& verticals, std::vector<SetAsideVertical>& all) {
+void set_aside(const std::vector<SetAsideVertical>& aside, std::vector<SeenVertical>& verticals,
+               std::vector<SetAsideVertical>& all) {
   std::set<ImageIndex> images;
-  for (const SetAsideVertical& vertical : verticals) images.insert(vertical.image);
-  std::erase_if(job.block.verticals, [&](const SeenVertical& vertical) { return images.contains(vertical.image); });
-  all.insert(all.end(), verticals.begin(), verticals.end());
+  for (const SetAsideVertical& vertical : aside) images.insert(vertical.image);
+  std::erase_if(verticals, [&](const SeenVertical& vertical) { return images.contains(vertical.image); });
+  all.insert(all.end(), aside.begin(), aside.end());
 }
 
-void tell_of_verticals(const Stage& stage, Job& job, const std::vector<SetAsideVertical>& aside, std::size_t all) {
+void tell_of_verticals(const Stage& stage, const Job& job, JobRecord& record,
+                       const std::vector<SetAsideVertical>& aside, std::size_t all) {
   const std::string text = set_aside_text(job.block, aside, all);
   if (text.empty()) return;
-  job.notes.push_back(text);
+  record.notes.push_back(text);
   say(job, stage.name, text);
 }
 
@@ -208,20 +210,22 @@ BlockState given_orientation(const Stage& stage, const Job& job, BlockState give
 
 }  // namespace
 
-BlockState run_orientation(const Stage& stage, Job& job, const std::vector<std::string>& matches) {
+OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& record,
+                                 const std::vector<std::string>& matches, std::vector<SeenVertical>& verticals) {
   BlockState start = initial_state(job.block);
-  const std::size_t verticals = job.block.verticals.size();
+  const std::size_t all = verticals.size();
   std::vector<SetAsideVertical> aside;
-  set_aside(job, against_given_poses(job.block), aside);
+  set_aside(against_given_poses(job.block), verticals, aside);
   if (std::all_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; })) {
     if (job.is_first_rank()) remove_record(job.store, stage.name);  // an earlier run may have needed the stage
-    tell_of_verticals(stage, job, aside, verticals);
-    return given_orientation(stage, job, std::move(start));
+    tell_of_verticals(stage, job, record, aside, all);
+    return {given_orientation(stage, job, std::move(start)), {}};
   }
   if (matches.empty())
     throw AgreedError<InputError>(
         "images without pose cannot be oriented from given tie points alone; give poses in the project file");
-  BlockState state;
+  OrientationStage made;
+  BlockState& state = made.state;
   std::uint64_t previous = 0;
   std::int64_t images_before = 0;
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
@@ -241,18 +245,19 @@ BlockState run_orientation(const Stage& stage, Job& job, const std::vector<std::
         orient_set(job, block, pairs, set, links, grown);
       write_orientation(path, grown);
     };
-    const StageOutcome outcome = run_stage(job, stage, {unit});
+    const StageOutcome outcome = run_stage(job, record, stage, {unit});
     if (!outcome.failures.empty())
       throw AgreedError<ComputeError>("orientation failed: " + outcome.failures.front().reason);
     const InitialOrientation done = read_orientation(job.store.verified_path(unit.name));
     state = done.state;
-    for (const auto& [frame, reason] : done.failed) job.not_oriented[frame] = reason;
-    set_aside(job, done.verticals_aside, aside);
+    for (const auto& [frame, reason] : done.failed) made.not_oriented[frame] = reason;
+    set_aside(done.verticals_aside, verticals, aside);
     previous = job.store.seal(unit.name)->content_hash;
     images_before = job.generations[g];
   }
-  tell_of_verticals(stage, job, aside, verticals);
-  return held_in_place(job, grow(state, job.block));
+  tell_of_verticals(stage, job, record, aside, all);
+  state = held_in_place(job, grow(state, job.block));
+  return made;
 }
 
 }  // namespace megablock

@@ -1,15 +1,23 @@
 // The stage of orientation. It makes orient/<generation>.h5, initial poses of all frames.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
 #include "cluster/job/job.h"
+#include "cluster/job/job_record.h"
 #include "cluster/job/stage.h"
 
 namespace megablock {
 
-// Collective. Returns the state of the block.
-BlockState run_orientation(const Stage& stage, Job& job, const std::vector<std::string>& matches);
+struct OrientationStage {
+  BlockState state;
+  std::map<FrameIndex, std::string> not_oriented;  // frames without a pose, and why
+};
+
+// Collective. `verticals`: those of the job's block; the ones that are set aside leave it.
+OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& record,
+                                 const std::vector<std::string>& matches, std::vector<SeenVertical>& verticals);
 
 }  // namespace megablock

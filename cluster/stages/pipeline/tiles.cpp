@@ -34,7 +34,8 @@ Tiles grow_tiles(const Job& job, LinkWeights links) {
   return tiles;
 }
 
-Tiles run_tiles_unit(const Stage& stage, Job& job, std::uint64_t inputs, const std::function<LinkWeights()>& links) {
+Tiles run_tiles_unit(const Stage& stage, const Job& job, JobRecord& record, std::uint64_t inputs,
+                     const std::function<LinkWeights()>& links) {
   Hasher hasher;
   hasher.add(stage.algorithm).add(inputs).add(job.generations);
   add_to_hash(hasher, job.settings.tiles);
@@ -43,17 +44,17 @@ Tiles run_tiles_unit(const Stage& stage, Job& job, std::uint64_t inputs, const s
   unit.name = stage.makes;
   unit.fingerprint = hasher.value();
   unit.write = [&](const std::string& path) { write_tiles(path, grow_tiles(job, links())); };
-  const StageOutcome outcome = run_stage(job, stage, {unit});
+  const StageOutcome outcome = run_stage(job, record, stage, {unit});
   if (!outcome.failures.empty()) throw AgreedError<ComputeError>("tiles failed: " + outcome.failures.front().reason);
   return read_tiles(job.store.verified_path(unit.name));
 }
 
 }  // namespace
 
-Tiles run_tiles(const Stage& stage, Job& job, const std::vector<std::string>& matches) {
+Tiles run_tiles(const Stage& stage, const Job& job, JobRecord& record, const std::vector<std::string>& matches) {
   Hasher hasher;
   for (const std::string& name : matches) hasher.add(job.store.seal(name)->content_hash);
-  return run_tiles_unit(stage, job, hasher.value(), [&] {
+  return run_tiles_unit(stage, job, record, hasher.value(), [&] {
     LinkWeights links;
     for (const std::string& name : matches)
       for (const VerifiedPair& pair : read_matches(job.store.verified_path(name)))
@@ -63,8 +64,8 @@ Tiles run_tiles(const Stage& stage, Job& job, const std::vector<std::string>& ma
   });
 }
 
-Tiles run_tiles_of_tracks(const Stage& stage, Job& job, const std::string& tie_points) {
-  return run_tiles_unit(stage, job, hash_file(tie_points), [&] {
+Tiles run_tiles_of_tracks(const Stage& stage, const Job& job, JobRecord& record, const std::string& tie_points) {
+  return run_tiles_unit(stage, job, record, hash_file(tie_points), [&] {
     LinkWeights links;
     std::vector<FrameIndex> frames;
     const auto add_tracks = [&](const TrackSet& tracks) {

@@ -5,13 +5,14 @@
 #include <vector>
 
 #include "cluster/job/job.h"
+#include "cluster/job/job_record.h"
 #include "cluster/job/stage.h"
 #include "io/block/image_graph.h"
 
 namespace megablock {
 
 // Collective. Works from verified matches, or from given tracks.
-Tiles run_tiles(const Stage& stage, Job& job, const std::vector<std::string>& matches);
-Tiles run_tiles_of_tracks(const Stage& stage, Job& job, const std::string& tie_points);
+Tiles run_tiles(const Stage& stage, const Job& job, JobRecord& record, const std::vector<std::string>& matches);
+Tiles run_tiles_of_tracks(const Stage& stage, const Job& job, JobRecord& record, const std::string& tie_points);
 
 }  // namespace megablock

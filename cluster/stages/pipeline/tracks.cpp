@@ -62,8 +62,8 @@ bool index_holds(const Job& job, const std::string& index, const std::vector<std
   return true;
 }
 
-std::vector<std::string> run_tracks_unit(const Stage& stage, Job& job, std::uint64_t inputs, const Tiles& tiles,
-                                         const TracksByTile& tracks_by_tile) {
+std::vector<std::string> run_tracks_unit(const Stage& stage, const Job& job, JobRecord& record, std::uint64_t inputs,
+                                         const Tiles& tiles, const TracksByTile& tracks_by_tile) {
   Hasher hasher;
   hasher.add(stage.algorithm).add(inputs).add(job.store.seal("tiles.h5")->content_hash);
   Unit unit;
@@ -84,9 +84,9 @@ std::vector<std::string> run_tracks_unit(const Stage& stage, Job& job, std::uint
   };
   if (job.is_first_rank() && !index_holds(job, unit.name, names)) job.store.remove(unit.name);
   job.ranks.barrier();
-  run_stage(job, stage, {unit});
+  run_stage(job, record, stage, {unit});
   if (!job.store.seal(unit.name))
-    throw AgreedError<ComputeError>("no tracks could be built: " + job.failures.back().reason);
+    throw AgreedError<ComputeError>("no tracks could be built: " + record.failures.back().reason);
   return names;
 }
 
@@ -223,26 +223,26 @@ IndexedVector<ImageIndex, std::vector<Keypoint>> read_keypoints(const Job& job) 
   return keypoints;
 }
 
-std::vector<std::string> run_tracks(const Stage& stage, Job& job, const std::vector<std::string>& matches,
-                                    const Tiles& tiles) {
+std::vector<std::string> run_tracks(const Stage& stage, const Job& job, JobRecord& record,
+                                    const std::vector<std::string>& matches, const Tiles& tiles) {
   Hasher hasher;
   hasher.add(job.settings.tracks.min_length).add(job.generations).add(job.settings.tracks.remove_eccentricity);
   if (job.settings.tracks.remove_eccentricity)
     for (const Camera& camera : job.block.cameras) add_to_hash(hasher, camera.intrinsics);
   for (const std::string& name : matches) hasher.add(job.store.seal(name)->content_hash);
-  return run_tracks_unit(stage, job, hasher.value(), tiles,
+  return run_tracks_unit(stage, job, record, hasher.value(), tiles,
                          [&](const auto& take) { build_tracks_by_tile(job, matches, tiles, take); });
 }
 
-std::vector<std::string> run_given_tracks(const Stage& stage, Job& job, const std::string& tie_points,
-                                          const Tiles& tiles) {
-  return run_tracks_unit(stage, job, hash_file(tie_points), tiles, [&](const auto& take) {
+std::vector<std::string> run_given_tracks(const Stage& stage, const Job& job, JobRecord& record,
+                                          const std::string& tie_points, const Tiles& tiles) {
+  return run_tracks_unit(stage, job, record, hash_file(tie_points), tiles, [&](const auto& take) {
     deal_given_tracks(tie_points, job.block, tiles, job.store.path("scratch/tracks"), take,
                       [&job] { job.tables.release(); });
   });
 }
 
-void index_measurements(Job& job, const std::vector<std::string>& tracks) {
+void index_measurements(const Job& job, const std::vector<std::string>& tracks) {
   const std::string damage = on_first_rank(job.ranks, [&] { return update_measurement_index(job.store, tracks); });
   if (!damage.empty() && job.is_first_rank()) warn_of_damage(job.store, job.log, kMeasurementIndex, damage);
 }

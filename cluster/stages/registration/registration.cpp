@@ -116,7 +116,8 @@ TileAdjustment rig_file_of(const RigEstimate& estimate) {
 
 // Estimates cameras and mounts. The block's cameras and mounts start from the estimated ones afterwards. Returns the
 // outcome in words.
-std::string run_rig(Job& job, LazyTracks& tracks, const RegistrationSettings& settings) {
+std::string run_rig(const Job& job, JobRecord& record, LazyTracks& tracks, const RegistrationSettings& settings,
+                    Block& block) {
   if (!settings.estimate_rig || !has_free_rig(job.block)) return "as given";
   const Trajectory trajectory = agreed_trajectory(job, settings.trajectory);
   Hasher hasher;
@@ -131,13 +132,12 @@ std::string run_rig(Job& job, LazyTracks& tracks, const RegistrationSettings& se
   unit.write = [&](const std::string& path) {
     write_adjustment(path, rig_file_of(estimate_rig(job.block, trajectory.input, tracks().tracks(), options)));
   };
-  run_stage(job, {.name = "rig"}, {unit});
-  if (!job.store.seal(kRig)) return "as given: " + job.failures.back().reason;
+  run_stage(job, record, {.name = "rig"}, {unit});
+  if (!job.store.seal(kRig)) return "as given: " + record.failures.back().reason;
   const TileAdjustment file = read_adjustment(job.store.verified_path(kRig));
-  for (std::size_t c = 0; c < file.cameras.size(); ++c)
-    job.block.cameras[file.cameras[c]].intrinsics = file.intrinsics[c];
+  for (std::size_t c = 0; c < file.cameras.size(); ++c) block.cameras[file.cameras[c]].intrinsics = file.intrinsics[c];
   for (std::size_t m = 0; m < file.mounts.size(); ++m)
-    job.block.rigs[file.mount_rigs[m]].mounts[static_cast<std::size_t>(file.mount_numbers[m])].pose = file.mounts[m];
+    block.rigs[file.mount_rigs[m]].mounts[static_cast<std::size_t>(file.mount_numbers[m])].pose = file.mounts[m];
   return file.summary;
 }
 
@@ -173,7 +173,8 @@ std::array<Pose, 4> poses_of(const Place& place, const JointInput& input,
   return {start(place.a), next(place.a, place.b), start(place.c), next(place.c, place.d)};
 }
 
-std::vector<Place> run_places(Job& job, const Trajectory& trajectory, const RegistrationSettings& settings) {
+std::vector<Place> run_places(const Job& job, JobRecord& record, const Trajectory& trajectory,
+                              const RegistrationSettings& settings) {
   Hasher hasher;
   hasher.add(kAlgorithm);
   add(hasher, settings.places);
@@ -187,7 +188,7 @@ std::vector<Place> run_places(Job& job, const Trajectory& trajectory, const Regi
     write_places(path, choose_places(positions, trajectory.input.pass, panorama_graph(positions, settings.places),
                                      settings.places));
   };
-  run_stage(job, {.name = "places"}, {unit});
+  run_stage(job, record, {.name = "places"}, {unit});
   return read_places(job.store.verified_path(kPlaces));
 }
 
@@ -211,7 +212,7 @@ struct Registrations {
   std::uint64_t hash = 0;  // hash of the units' contents
 };
 
-Registrations run_registrations(Job& job, LazyTracks& tracks, const Trajectory& trajectory,
+Registrations run_registrations(const Job& job, JobRecord& record, LazyTracks& tracks, const Trajectory& trajectory,
                                 const std::vector<Place>& places, const RegistrationSettings& settings) {
   const auto size = static_cast<std::size_t>(settings.units_places);
   std::vector<Unit> units;
@@ -232,7 +233,7 @@ Registrations run_registrations(Job& job, LazyTracks& tracks, const Trajectory& 
     };
     units.push_back(std::move(unit));
   }
-  run_stage(job, {.name = "registrations"}, units);
+  run_stage(job, record, {.name = "registrations"}, units);
   Registrations all;
   Hasher hasher;
   for (const Unit& unit : units) {
@@ -282,8 +283,8 @@ RegisteredTrajectory adjust_trajectory(const Job& job, Trajectory trajectory, co
   return registered;
 }
 
-RegisteredTrajectory run_trajectory(Job& job, const Trajectory& trajectory, const Registrations& registrations,
-                                    const RegistrationSettings& settings) {
+RegisteredTrajectory run_trajectory(const Job& job, JobRecord& record, const Trajectory& trajectory,
+                                    const Registrations& registrations, const RegistrationSettings& settings) {
   Hasher hasher;
   hasher.add(kAlgorithm).add(block_fingerprint(job));
   hasher.add(settings.use_registrations).add(settings.use_resections);
@@ -296,9 +297,9 @@ RegisteredTrajectory run_trajectory(Job& job, const Trajectory& trajectory, cons
   unit.write = [&](const std::string& path) {
     write_trajectory(path, adjust_trajectory(job, trajectory, registrations.rows, settings));
   };
-  run_stage(job, {.name = "trajectory"}, {unit});
+  run_stage(job, record, {.name = "trajectory"}, {unit});
   if (!job.store.seal(kTrajectory))
-    throw AgreedError<ComputeError>("the trajectory could not be adjusted: " + job.failures.back().reason);
+    throw AgreedError<ComputeError>("the trajectory could not be adjusted: " + record.failures.back().reason);
   return read_trajectory(job.store.verified_path(kTrajectory));
 }
 
@@ -329,8 +330,9 @@ void note_free_position(const JointInput& input, const RegisteredTrajectory& reg
         "either");
 }
 
-RegistrationSummary summarise(const Job& job, const Trajectory& trajectory, const std::vector<RegisteredPlace>& rows,
-                              const RegisteredTrajectory& registered, const RegistrationSettings& settings) {
+RegistrationSummary summarise(const Job& job, const JobRecord& record, const Trajectory& trajectory,
+                              const std::vector<RegisteredPlace>& rows, const RegisteredTrajectory& registered,
+                              const RegistrationSettings& settings) {
   RegistrationSummary s;
   s.frames = std::ssize(registered.frames);
   s.chain = std::ssize(trajectory.input.chain);
@@ -363,7 +365,7 @@ RegistrationSummary summarise(const Job& job, const Trajectory& trajectory, cons
     s.check_points.push_back(fmt::format("{} {:.4f} {:.4f} {:.4f} m", control.name, off.x(), off.y(), off.z()));
   }
   if (!s.check_points.empty()) s.check_rms_m = std::sqrt(squares / static_cast<double>(s.check_points.size()));
-  s.notes = job.notes;
+  s.notes = record.notes;
   s.notes.insert(s.notes.end(), trajectory.notes.begin(), trajectory.notes.end());
   note_free_position(trajectory.input, registered, settings, s.notes);
   s.digest = job.store.seal(kTrajectory)->content_hash;
@@ -381,20 +383,22 @@ void RegistrationSettings::check() const {
   if (units_places < 1) throw InputError("units_places must be at least 1");
 }
 
-RegistrationSummary run_registration(Job& job, const TrackSource& source, const RegistrationSettings& settings) {
+RegistrationSummary run_registration(const Job& job, JobRecord& record, Block& block, const TrackSource& source,
+                                     const RegistrationSettings& settings) {
   LazyTracks tracks(job.block, source);
-  const std::string rig = run_rig(job, tracks, settings);
+  const std::string rig = run_rig(job, record, tracks, settings, block);
   const Trajectory trajectory = agreed_trajectory(job, settings.trajectory);
   Registrations registrations;
   if (settings.use_registrations)
-    registrations = run_registrations(job, tracks, trajectory, run_places(job, trajectory, settings), settings);
+    registrations =
+        run_registrations(job, record, tracks, trajectory, run_places(job, record, trajectory, settings), settings);
   const std::vector<RegisteredPlace>& rows = registrations.rows;
-  const RegisteredTrajectory registered = run_trajectory(job, trajectory, registrations, settings);
+  const RegisteredTrajectory registered = run_trajectory(job, record, trajectory, registrations, settings);
   on_first_rank(job.ranks, [&] {
     write_registration_outputs(job, trajectory.input.start, rows, registered, settings.joint, source.file);
     return std::string();
   });
-  RegistrationSummary summary = summarise(job, trajectory, rows, registered, settings);
+  RegistrationSummary summary = summarise(job, record, trajectory, rows, registered, settings);
   summary.rig = rig;
   return summary;
 }

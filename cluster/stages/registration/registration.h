@@ -11,6 +11,7 @@
 #include "adjust/registration/rig_estimate.h"
 #include "adjust/registration/trajectory.h"
 #include "cluster/job/job.h"
+#include "cluster/job/job_record.h"
 #include "io/block/tracks.h"
 #include "partition/candidates/places.h"
 
@@ -51,9 +52,10 @@ struct RegistrationSummary {
   std::uint64_t digest = 0;                      // hash of the bits of the trajectory
 };
 
-// Collective. Rank 0 also writes register/poses.csv, register/registrations.csv, and register/block.yaml with
-// register/block.h5 (registration_output.h).
-RegistrationSummary run_registration(Job& job, const TrackSource& tracks, const RegistrationSettings& settings);
+// Collective. `block`: that of the job; a rig that is estimated goes into it. Rank 0 also writes register/poses.csv,
+// register/registrations.csv, and register/block.yaml with register/block.h5 (registration_output.h).
+RegistrationSummary run_registration(const Job& job, JobRecord& record, Block& block, const TrackSource& tracks,
+                                     const RegistrationSettings& settings);
 
 std::string to_text(const RegistrationSummary& summary);
 

@@ -16,11 +16,11 @@ namespace megablock {
 namespace {
 
 // The names of the units of a stage; empty when the job does not have the stage.
-std::vector<std::string> units_of(const Job& job, const std::string& stage) {
+std::vector<std::string> units_of(const JobRecord& record, const std::string& name) {
   std::vector<std::string> names;
-  for (const StageRecord& record : job.records)
-    if (record.stage == stage)
-      for (const auto& unit : record.units) names.push_back(unit.first);
+  for (const StageRecord& stage : record.stages)
+    if (stage.stage == name)
+      for (const auto& unit : stage.units) names.push_back(unit.first);
   return names;
 }
 
@@ -53,21 +53,21 @@ Provenance provenance_of(const Job& job) {
   return provenance;
 }
 
-IndexedVector<ImageIndex, ImageRecord> image_records(const Job& job) {
+IndexedVector<ImageIndex, ImageRecord> image_records(const Job& job, const JobRecord& record) {
   IndexedVector<ImageIndex, ImageRecord> records;
-  const std::vector<std::string> shards = units_of(job, "features");
+  const std::vector<std::string> shards = units_of(record, "features");
   if (shards.empty()) return records;
   records.assign(job.block.images.size(), {-1, -1, 0, 0, 0});
   for (const std::string& shard : shards)
     for (const ImageFeatures& image : read_keypoints(job.store.verified_path(shard))) {
       if (!records.contains(image.image)) continue;
-      ImageRecord& record = records[image.image];
-      if (image.width > 0) record.width = image.width;
-      if (image.height > 0) record.height = image.height;
-      record.features = static_cast<std::int64_t>(image.keypoints.size());
+      ImageRecord& row = records[image.image];
+      if (image.width > 0) row.width = image.width;
+      if (image.height > 0) row.height = image.height;
+      row.features = static_cast<std::int64_t>(image.keypoints.size());
     }
-  for (const std::string& cell : units_of(job, "matching")) {
-    if (!job.store.seal(cell)) continue;  // the unit failed
+  for (const std::string& cell : units_of(record, "matching")) {
+    if (!job.store.seal(cell)) continue;  // failed
     for (const VerifiedPair& pair : read_matches(job.store.verified_path(cell))) {
       if (pair.model == PairModel::kNone) continue;
       for (const ImageIndex image : {pair.a, pair.b}) {

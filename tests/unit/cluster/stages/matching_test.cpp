@@ -8,6 +8,7 @@
 
 #include "adjust/orientation/vertical_check.h"
 #include "cluster/job/job.h"
+#include "cluster/job/job_record.h"
 #include "cluster/stages/common/units.h"
 #include "cluster/stages/merge/merge_checkpoint.h"
 #include "cluster/terminal/option_checks.h"
@@ -92,21 +93,20 @@ CellMatches matches_of(const Block& block, const std::vector<ImageFeatures>& fea
   int argc = 0;
   char** argv = nullptr;
   Communicator ranks(&argc, &argv);
-  Job job{.options = options,
-          .ranks = ranks,
-          .store = store,
-          .settings = {},
-          .events = EventLog(store, 0),
-          .log = {},
-          .block = block,
-          .generations = {kImages},
-          .records = {},
-          .failures = {},
-          .not_oriented = {},
-          .notes = {}};
-  job.settings.matching.by_turn = by_turn;
+  JobOptions settings;
+  settings.matching.by_turn = by_turn;
+  const PagedTables tables(store.directory());
+  const Job job{.options = options,
+                .ranks = ranks,
+                .store = store,
+                .settings = settings,
+                .log = {},
+                .block = block,
+                .tables = tables,
+                .generations = {kImages}};
+  JobRecord record{.events = EventLog(store, 0), .stages = {}, .failures = {}, .notes = {}};
   const std::vector<std::string> names =
-      run_matching(*find_stage("matching"), job, {std::vector<std::uint64_t>(kImages, 7), {shard}}, graph);
+      run_matching(*find_stage("matching"), job, record, {std::vector<std::uint64_t>(kImages, 7), {shard}}, graph);
   const UnitSeal seal = store.seal(names.at(0)).value();
   return {seal.fingerprint, seal.content_hash, read_all_matches(job, names)};
 }
