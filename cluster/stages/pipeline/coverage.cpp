@@ -56,7 +56,7 @@ void write_unit(const std::string& path, const std::map<ImageIndex, ImageCoverag
 Coverages read_units(const Job& job, const std::vector<Unit>& units) {
   Coverages all(job.block.images.size(), ImageCoverage());
   for (const Unit& unit : units) {
-    if (!job.store.seal(unit.name)) continue;  // failed, and recorded so
+    if (!job.store.up_to_date(unit.name, unit.fingerprint)) continue;  // failed, and recorded so
     std::ifstream in(job.store.verified_path(unit.name));
     std::int64_t image = 0;
     for (ImageCoverage c; in >> image >> c.observations >> c.images_of_points >> c.cells;)
