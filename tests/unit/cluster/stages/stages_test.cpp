@@ -7,6 +7,7 @@
 #include <iterator>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "cluster/job/stage.h"
 
@@ -35,6 +36,23 @@ TEST(Stages, StandInTheDocumentsWithTheirFiles) {
     EXPECT_THAT(architecture, HasSubstr(row_of(stage)));
     EXPECT_THAT(files, HasSubstr("\n  " + std::string(stage.makes) + " ")) << stage.name;
   }
+}
+
+// "a, b and c", or with another word before the last.
+std::string list_of(const std::vector<std::string>& words, const std::string& before_last) {
+  std::string list = words.front();
+  for (std::size_t i = 1; i < words.size(); ++i) list += (i + 1 < words.size() ? ", " : before_last) + words[i];
+  return list;
+}
+
+TEST(Stages, AreListedInTheGuideAndTheirCommandsInTheReference) {
+  std::vector<std::string> names, commands;
+  for (const Stage& stage : all_stages()) {
+    names.emplace_back(stage.name);
+    if (stage.help != nullptr) commands.emplace_back(stage.command);
+  }
+  EXPECT_THAT(document("guide/first-block.md"), HasSubstr("The stages are " + list_of(names, " and ") + ".\n"));
+  EXPECT_THAT(document("reference/commands.md"), HasSubstr("\n## " + list_of(commands, ", ") + "\n"));
 }
 
 TEST(Stages, ShareNoNameFolderOrSection) {
