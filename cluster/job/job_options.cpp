@@ -1,3 +1,5 @@
+// Describes each option struct once, for both the project file and the fingerprints, so that no option can be read
+// without being hashed.
 
 #include "cluster/job/job_options.h"
 
@@ -126,7 +128,7 @@ constexpr OptionSection section(const char* name, const char* file_key = nullptr
           [](const JobOptions& options) { ((options.*members).check(), ...); }};
 }
 
-// Visitor that sets every described value that the project file has.
+// Sets every described value that the project file gives.
 class ReadingVisitor final : public OptionVisitor {
  public:
   ReadingVisitor(const StageSettings& settings, const char* section) : reader_(settings, section) {}
@@ -144,7 +146,7 @@ class ReadingVisitor final : public OptionVisitor {
   SettingsReader reader_;
 };
 
-// Visitor that feeds every described value to a hash.
+// Adds every described value to a hash.
 class HashVisitor final : public OptionVisitor {
  public:
   explicit HashVisitor(Hasher& hasher) : hasher_(hasher) {}
@@ -243,7 +245,7 @@ JobOptions read_options(const StageSettings& settings) {
     visitor.finish();
   }
   for (const OptionSection* section : option_sections()) check_section(settings, *section, options);
-  options.orientation.observations = options.adjustment.observations;  // one description for all stages
+  options.orientation.observations = options.adjustment.observations;  // all stages share one description of them
   return options;
 }
 
@@ -251,7 +253,7 @@ JobOptions options_of_job(const JobStore& store) { return read_options(JobJson::
 
 std::vector<OptionValue> option_values(const JobOptions& options) {
   std::vector<OptionValue> values;
-  JobOptions described = options;  // a visitor may also write
+  JobOptions described = options;  // a copy, because a visitor could also write
   for (const OptionSection* section : option_sections()) {
     TextVisitor visitor(section->name, values);
     section->describe(visitor, described);

@@ -58,7 +58,7 @@ JobOptions read_options(const StageSettings& settings);
 // The options of the last run of a job.
 JobOptions options_of_job(const JobStore& store);
 
-// The values in force, in the order of the stages.
+// One option with its present value; lists of them are in the order of the stages.
 struct OptionValue {
   std::string section, key, value;
 };

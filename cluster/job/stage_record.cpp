@@ -25,7 +25,7 @@ bool iterates(const StageRecord& record) {
 // The events of the present units of a stage.
 std::vector<UnitEvent> latest_events(const StageRecord& record, const std::vector<UnitEvent>& events) {
   std::vector<UnitEvent> found;
-  if (iterates(record)) {  // its iterations, and the result that ends it
+  if (iterates(record)) {  // the events of its iterations, and of the result that ends it
     bool ended = false;
     for (const UnitEvent& event : events) {
       if (event.stage != record.stage) continue;

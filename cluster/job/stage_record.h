@@ -40,8 +40,8 @@ struct StageStatus {
   StageState state = StageState::kWaiting;
   std::int64_t done = 0;  // units whose file exists and is up to date
 };
-// The states of these stages, which are in the order in which they run. An optional one is left out when it has no
-// units and the stage behind it has some.
+// The states of these stages, which are in the order in which they run. An optional stage is not
+// listed when it has no units and the next stage has some.
 std::vector<StageStatus> stage_status(const JobStore& store, const std::vector<Stage>& expected);
 
 // Wall clock and memory of a stage, over all runs of the job: the time during which any rank worked on its units. Of

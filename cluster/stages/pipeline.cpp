@@ -301,7 +301,7 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
   if (tie_points.empty())
     keep_freed_memory();  // features of images come next
   else
-    use_memory_sparingly();  // the heap, too, that preparing has left
+    use_memory_sparingly();  // gives back the heap that the preparation has freed, too
   JobBlock own{read_block_without_names(store.verified_path("block.h5")), PagedTables(store.directory())};
   page_tables(own.block, own.tables);
   if (tie_points.empty()) restore_names(store, own);
@@ -313,7 +313,7 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
                 .block = own.block,
                 .tables = own.tables,
                 .generations = written.at<std::vector<std::int64_t>>("generations")};
-  omp_set_num_threads(job.options.threads);  // where no other number is asked for: inside tiles
+  omp_set_num_threads(job.options.threads);  // the default inside tiles
   JobRecord record{.events = EventLog(store, ranks.rank()),
                    .stages = {},
                    .failures = {},
@@ -325,7 +325,7 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
                             ranks.size(), counted(job.options.threads, "thread")));
   for (const std::string& warning : record.notes) job.log.write(LogLevel::kWarning, "init", "", warning);
   run_logged(job, record, [&] { stages(job, record, own, tie_points); });
-  ranks.barrier();  // the lock is held until everybody is done
+  ranks.barrier();  // the lock is held until all ranks are done
   return record.failures.empty() ? kExitDone : kExitFailedUnits;
 }
 

@@ -66,7 +66,7 @@ bool orients_by_names(const Block& block) {
 }
 
 void orientation(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
-  return_freed_memory();  // of the tracks
+  return_freed_memory();  // memory of the tracks
   job.tables.release();
   if (orients_by_names(job.block)) restore_names(job.store, results.own);
   results.oriented = run_orientation(stage, job, record, results.matches, results.own.block.verticals);

@@ -1,5 +1,5 @@
-// What the stages of a job hand on to one another. The table of the stages (cluster/job/stage.h) has its rows in
-// stages.cpp.
+// The results that the stages of a job give to later stages. The rows of the table of stages (cluster/job/stage.h) are
+// in stages.cpp.
 #pragma once
 
 #include <string>

@@ -35,9 +35,9 @@ struct Project {
   std::vector<std::string> warnings;  // one line each: GPS at 0, 0, copies, outliers, ...
 };
 
-// Reads and validates; InputError with file:line for unknown keys, wrong types or units, missing files. `sections`:
-// those of the program that reads the options. `ground`: of a running job, so that images added later cannot move the
-// origin.
+// Reads and checks a project. Throws InputError with file:line for unknown keys, wrong types or units, missing files.
+// `sections`: the sections of options that the calling program reads. `ground`: the ground frame of a running job, so
+// that images added later cannot move the origin.
 Project read_project(const std::string& path, const std::vector<SettingsSection>& sections = {},
                      const std::optional<GroundFrame>& ground = std::nullopt);
 

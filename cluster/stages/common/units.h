@@ -1,4 +1,4 @@
-// The names of units.
+// Names of the units of all stages.
 #pragma once
 
 #include <cstdint>

@@ -12,8 +12,8 @@
 
 namespace megablock {
 
-// The result without its tracks and digest. `block`: that of the job; it is empty afterwards, as is the outcome, so
-// that a block of a million images is not in memory twice. `not_oriented`: reasons by frame. `parts`: of all tiles.
+// The result without its tracks and digest. `block` is the block of the job. It and the outcome are empty afterwards,
+// so that a block of a million images is not in memory twice. `not_oriented`: reasons by frame. `parts`: of all tiles.
 BlockResult assemble_result(const Job& job, const JobRecord& record, Block& block, const Tiles& tiles,
                             const std::map<FrameIndex, std::string>& not_oriented, MergeOutcome outcome,
                             const std::vector<TilePart>& parts);

@@ -61,7 +61,7 @@ int most_rounds(const MergeSettings& settings) {
 // Clears the scratch folder of the job. The folder itself stays, because another disk may be mounted there. Folders of
 // this run's ranks stay while the ranks `use` them.
 void clear_scratch(const Job& job, bool use) {
-  const std::vector<std::string> kept =  // ranks have removed their own files before they say so
+  const std::vector<std::string> kept =  // ranks have removed their own files before they report
       job.ranks.gather_all(use ? scratch_folder_of_rank(job) : std::string());
   on_first_rank(job.ranks, [&] {
     const std::filesystem::path folder(job.store.path("scratch"));
@@ -266,7 +266,7 @@ void run_merge(const Stage& stage, const Job& job, JobRecord& record, JobBlock& 
     if (!is_current(job, kResult, fingerprint)) return "";
     return std::filesystem::exists(job.store.path(kReportPage)) ? "current" : "";
   });
-  if (!current.empty()) {  // a run that was killed behind its result may have left what led to it
+  if (!current.empty()) {  // a run that was killed after its result may have left checkpoints
     if (job.is_first_rank()) MergeCheckpoint(job, record.events, fingerprint).clear();
     return add_shortfall(job, record, before);
   }

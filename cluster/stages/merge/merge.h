@@ -12,8 +12,7 @@
 
 namespace megablock {
 
-// Merge and result: merge/..., result/block.h5, result/report.html. `own`: the block of the job, not to be used
-// afterwards.
+// Makes merge/..., result/block.h5 and result/report.html. `own`, the block of the job, must not be used afterwards.
 void run_merge(const Stage& stage, const Job& job, JobRecord& record, JobBlock& own, OrientationStage oriented,
                const Tiles& tiles, const std::vector<std::string>& tracks, const std::vector<std::string>& adjusted);
 

@@ -16,9 +16,9 @@ struct CalibrationSettings {
   bool json = false;         // prints figures instead of the table
 };
 
-// Collective. `notes`: warnings of the job. `start`: frames, with poses where they are known. Writes calibration.yaml
-// (calibration-refused.yaml when the result is no better than the start) and calibration.html into the job folder, and
-// prints the figures. Throws on every rank when the calibration is refused.
+// Collective. `notes`: warnings of the job. `start`: the frames, with poses where they are known. Writes
+// calibration.yaml (calibration-refused.yaml when the result is no better than the start) and calibration.html into the
+// job folder, and prints the figures. Throws on every rank when the calibration is refused.
 void run_calibration(const Job& job, const std::vector<std::string>& notes, const BlockState& start,
                      const TrackSet& tracks, const CalibrationSettings& settings);
 

@@ -67,7 +67,7 @@ IndexedVector<ImageIndex, ImageRecord> image_records(const Job& job, const JobRe
       row.features = static_cast<std::int64_t>(image.keypoints.size());
     }
   for (const std::string& cell : units_of(record, "matching")) {
-    if (!job.store.seal(cell)) continue;  // failed
+    if (!job.store.seal(cell)) continue;  // the unit failed
     for (const VerifiedPair& pair : read_matches(job.store.verified_path(cell))) {
       if (pair.model == PairModel::kNone) continue;
       for (const ImageIndex image : {pair.a, pair.b}) {
