@@ -1,62 +1,42 @@
 // Finds the connected parts of a block. Two frames are connected if both have a kept observation of the same tie,
 // control or check point, or if there is a relative pose between them.
 //
-// The sets of frames are a union-find forest. The smaller index becomes the root, so the root of a part is its first
-// frame and the order of the joins does not matter. A track joins each of its frames to the previous one, which needs
-// one join per observation.
+// The representative of a set is its first frame (io/base/disjoint_sets.h). A track unites each of its frames with the
+// previous one, which needs one union per observation.
 #include "io/evaluation/parts.h"
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+
+#include "io/base/disjoint_sets.h"
 
 namespace megablock::report {
 
 namespace {
 
-class FrameSets {
- public:
-  explicit FrameSets(std::size_t frames) : parent_(frames) {
-    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
-  }
-  std::size_t find(std::size_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(std::size_t i, std::size_t j) {
-    i = find(i), j = find(j);
-    parent_[std::max(i, j)] = std::min(i, j);
-  }
+std::int64_t frame_at(const BlockResult& result, ImageIndex image) { return result.block.images[image].frame.value; }
 
- private:
-  std::vector<std::size_t> parent_;
-};
-
-std::size_t frame_at(const BlockResult& result, ImageIndex image) {
-  return static_cast<std::size_t>(result.block.images[image].frame.value);
-}
-
-void join_tie_points(const BlockResult& result, const TrackResults& batch, FrameSets& sets) {
+void join_tie_points(const BlockResult& result, const TrackResults& batch, DisjointSets& sets) {
   for (std::size_t t = 0; t + 1 < batch.tracks.begin.size(); ++t) {
     if (t >= batch.points.size() || !batch.points[t].allFinite()) continue;
     std::int64_t first = -1;
     for (std::int64_t o = batch.tracks.begin[t]; o < batch.tracks.begin[t + 1]; ++o) {
       const auto i = static_cast<std::size_t>(o);
       if (i >= batch.kept.size() || !batch.kept[i]) continue;
-      const auto frame = static_cast<std::int64_t>(frame_at(result, batch.tracks.image[i]));
-      if (first >= 0) sets.join(static_cast<std::size_t>(first), static_cast<std::size_t>(frame));
+      const std::int64_t frame = frame_at(result, batch.tracks.image[i]);
+      if (first >= 0) sets.unite(first, frame);
       first = frame;
     }
   }
 }
 
-void join_control_points(const BlockResult& result, FrameSets& sets) {
+void join_control_points(const BlockResult& result, DisjointSets& sets) {
   for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
     const auto& measurements = result.block.control_points[p].measurements;
     const ImageMeasurement* first = nullptr;
     for (std::size_t m = 0; m < std::min(measurements.size(), result.control[p].residual_px.size()); ++m) {
       if (!result.control[p].takes_part(m)) continue;
-      if (first) sets.join(frame_at(result, first->image), frame_at(result, measurements[m].image));
+      if (first) sets.unite(frame_at(result, first->image), frame_at(result, measurements[m].image));
       first = &measurements[m];
     }
   }
@@ -66,16 +46,16 @@ void join_control_points(const BlockResult& result, FrameSets& sets) {
 
 void find_parts(const BlockResult& result, const TrackBatches& tracks, Figures& figures) {
   const std::size_t frames = result.block.frames.size();
-  FrameSets sets(frames);
+  DisjointSets sets(static_cast<std::int64_t>(frames));
   tracks.visit([&](const TrackResults& batch) { join_tie_points(result, batch, sets); });
   join_control_points(result, sets);
   for (const RelativePose& relative : result.block.relative_poses)
     if (oriented(result, relative.from) && oriented(result, relative.to))
-      sets.join(static_cast<std::size_t>(relative.from.value), static_cast<std::size_t>(relative.to.value));
+      sets.unite(relative.from.value, relative.to.value);
 
   std::vector<std::size_t> size(frames, 0), roots;
-  for (std::size_t f = 0; f < frames; ++f)
-    if (oriented(result, FrameIndex(static_cast<std::int64_t>(f)))) ++size[sets.find(f)];
+  for (FrameIndex f(0); result.block.frames.contains(f); ++f.value)
+    if (oriented(result, f)) ++size[static_cast<std::size_t>(sets.find(f.value))];
   for (std::size_t f = 0; f < frames; ++f)
     if (size[f] > 0) roots.push_back(f);
   std::stable_sort(roots.begin(), roots.end(), [&](std::size_t a, std::size_t b) { return size[a] > size[b]; });
@@ -86,7 +66,7 @@ void find_parts(const BlockResult& result, const TrackBatches& tracks, Figures& 
   figures.part_of_frame.assign(frames, -1);
   for (FrameIndex frame(0); figures.part_of_frame.contains(frame); ++frame.value) {
     if (!oriented(result, frame)) continue;
-    figures.part_of_frame[frame] = row[sets.find(static_cast<std::size_t>(frame.value))];
+    figures.part_of_frame[frame] = row[static_cast<std::size_t>(sets.find(frame.value))];
     ++figures.parts[static_cast<std::size_t>(figures.part_of_frame[frame])].frames;
   }
   for (const Image& image : result.block.images)

@@ -29,7 +29,9 @@ class AerialScene : public Scene {
 
   // Returns the terrain point at a random pixel of the frame's image. Its height is found by fixed-point iteration.
   std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override {
-    const Eigen::Vector2d pixel(random.uniform(0, options_.image_width), random.uniform(0, options_.image_height));
+    // One after the other, because C++ leaves open in which order it evaluates the arguments of a call.
+    const double row = random.uniform(0, options_.image_height), column = random.uniform(0, options_.image_width);
+    const Eigen::Vector2d pixel(column, row);
     const auto ray = viewing_ray(intrinsics_, pixel);
     if (!ray) return std::nullopt;
     const Eigen::Vector3d direction = frame.rotation.conjugate() * *ray;

@@ -91,7 +91,9 @@ class PanoramaScene : public Scene {
 
   // Returns a point at a random pixel of the frame's image.
   std::optional<SurfacePoint> sample(const Pose& frame, Random& random) const override {
-    const Eigen::Vector2d pixel(random.uniform(0, options_.image_width), random.uniform(0, options_.image_height));
+    // One after the other, because C++ leaves open in which order it evaluates the arguments of a call.
+    const double row = random.uniform(0, options_.image_height), column = random.uniform(0, options_.image_width);
+    const Eigen::Vector2d pixel(column, row);
     const double distance = options_.panorama_radius_m * (1 + options_.depth_spread * random.uniform(-1, 1));
     const auto ray = viewing_ray(intrinsics_, pixel);
     if (!ray) return std::nullopt;

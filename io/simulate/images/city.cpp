@@ -125,8 +125,10 @@ void City::build_town() {
       Random random(options_.seed, Random::Purpose::kImage,
                     mix_bits(static_cast<std::uint64_t>(i)) + static_cast<std::uint64_t>(j));
       const bool built = random.uniform() < 0.65;
-      const Eigen::Vector2d size(random.uniform(0.35, 0.65), random.uniform(0.35, 0.65));
-      const Eigen::Vector2d place(random.uniform(0.1, 0.9), random.uniform(0.1, 0.9));
+      // One after the other, because C++ leaves open in which order it evaluates the arguments of a call.
+      const double depth = random.uniform(0.35, 0.65), width = random.uniform(0.35, 0.65);
+      const double up = random.uniform(0.1, 0.9), along = random.uniform(0.1, 0.9);
+      const Eigen::Vector2d size(width, depth), place(along, up);
       const double height = options_.height_m * random.uniform(0.04, 0.18);
       if (!built) continue;
       const Eigen::Vector2d corner = Eigen::Vector2d(static_cast<double>(i), static_cast<double>(j)) +
