@@ -74,9 +74,7 @@ void orientation(const Stage& stage, const Job& job, JobRecord& record, StageRes
   job.tables.release();
   const auto& oriented = results.oriented.state.oriented;
   if (std::none_of(oriented.begin(), oriented.end(), [](auto o) { return o != 0; }))
-    throw AgreedError<ComputeError>(
-        "no image could be oriented from the matches; check that images overlap and that focal lengths are right, "
-        "leave out wrong GPS positions ('gps: {use: false}'), or give approximate poses ('poses')");
+    throw AgreedError<ComputeError>(why_nothing_is_oriented(job.block));
 }
 
 void adjustment(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {

@@ -159,7 +159,7 @@ std::string describe(const GlobalState& state) {
                                               "failed: no step decreases the cost"};
   char line[200];
   std::snprintf(line, sizeof line, "global adjustment %s after %s (%d accepted): cost %.6g -> %.6g, decrement %.2e",
-                kOutcomes[static_cast<int>(state.outcome)], counted(state.iterations, "step").c_str(), state.accepted,
+                kOutcomes[static_cast<int>(state.outcome)], counted(state.iterations, "iteration").c_str(), state.accepted,
                 state.initial_cost, state.cost, std::sqrt(state.decrement_squared));
   return line;
 }

@@ -192,7 +192,7 @@ class BadInputJob(CopyOfTheBlock):
         self.assertTrue((self.job / "result/block.h5").exists())
         failures = status(self.job)["failures"]
         self.assertEqual([(f["stage"], f["unit"]) for f in failures], [("merge", "result/block.h5")])
-        self.assertRegex(failures[0]["reason"], r"did not converge: .* after 1 step \(")
+        self.assertRegex(failures[0]["reason"], r"did not converge: after 1 iteration .*'merge.max_iterations'")
         project.write_text(given)
         megablock("run", project, "-j", self.job, "-q")
         self.assertEqual(status(self.job)["failed"], 0)

@@ -39,7 +39,7 @@ def check_what_is_said(folder):
     ends = [line for line in done.stderr.splitlines() if "global adjustment converged" in line]
     assert len(ends) > 1 and "limit" not in ends[-1], done.stderr
     for line in ends[:-1]:
-        assert re.search(r"\(limit 9\.8e-02 of a round before the last\)$", line), line  # 0.01 sqrt(6 * 16)
+        assert re.search(r"\(limit 9\.8e-02 before the last screening\)$", line), line  # 0.01 sqrt(6 * 16)
     for text in (done.stdout + done.stderr, megablock("status", job)):
         assert re.search(r"  4 check points: rms of adjusted - given 0\.\d+ m horizontal", text), text
     with h5py.File(os.path.join(job, "result/block.h5")) as result:

@@ -27,6 +27,7 @@
 #include "io/base/error.h"
 #include "io/base/hash.h"
 #include "io/store/job/events.h"
+#include "io/text/counted.h"
 #include "merge/tree/merge_tree_runner.h"
 
 namespace megablock {
@@ -87,13 +88,13 @@ GlobalOptions options_of(const MergeSettings& settings, std::size_t frames, bool
   return options;
 }
 
-// A round before the last one ends by its own, looser limit. The line then names that limit, because "converged" alone
-// would mean the limit of the options.
+// The iterations before the last screening end by a looser limit of their own. The line then names that limit, because
+// "converged" alone would mean the limit of the options.
 void say_iteration(const Job& job, const GlobalState& state, const GlobalOptions& options) {
   if (!job.is_first_rank()) return;
   std::string line = describe(state);
   if (state.outcome == GlobalOutcome::kConverged && options.max_decrement > job.settings.merge.decrement)
-    line += fmt::format(" (limit {:.1e} of a round before the last)", options.max_decrement);
+    line += fmt::format(" (limit {:.1e} before the last screening)", options.max_decrement);
   say(job, "merge", line);
 }
 
@@ -192,9 +193,23 @@ double largest(const Job& job, double figure) {
   return figure;
 }
 
+std::string without_optimum(const GlobalState& state, double limit) {
+  const std::string after = "the adjustment did not converge: after " + counted(state.iterations, "iteration");
+  const double decrement = std::sqrt(state.decrement_squared);
+  if (state.outcome == GlobalOutcome::kFailed)
+    return fmt::format(
+        "{} no step decreases the cost, although the next one would be {:.1e} sigmas long; check start "
+        "poses and cameras, and whether many observations are wrong",
+        after, decrement);
+  return fmt::format(
+      "{} the next one would still be {:.1e} sigmas long ({:.1e} is asked); raise "
+      "'merge.max_iterations', or determine the block better by heights, attitudes or control points",
+      after, decrement, limit);
+}
+
 // Why an existing result counts as a failed unit, in this run and in later ones that find it; empty: it does not.
-std::string shortfall(const Adjusted& adjusted) {
-  if (!adjusted.converged) return "the global adjustment did not converge: " + describe(adjusted.position.global);
+std::string shortfall(const Adjusted& adjusted, const MergeSettings& settings) {
+  if (!adjusted.converged) return without_optimum(adjusted.position.global, settings.decrement);
   if (std::ranges::none_of(adjusted.state.oriented, [](std::uint8_t oriented) { return oriented != 0; }))
     return "no image is oriented: too few observations hold in the adjustment; check start poses and cameras, and "
            "the limits for tie points under 'adjustment' in the project file";
@@ -273,7 +288,7 @@ void run_merge(const Stage& stage, const Job& job, JobRecord& record, JobBlock& 
 
   MergeCheckpoint checkpoint(job, record.events, fingerprint);
   Adjusted adjusted = adjust_block(job, inputs, checkpoint);
-  const std::string reason = shortfall(adjusted);
+  const std::string reason = shortfall(adjusted, job.settings.merge);
   return_freed_memory();  // memory of fronts and tiles
   clear_scratch(job, false);
   const std::vector<TilePart> parts = gather_parts(job, adjusted, tracks.size());

@@ -260,4 +260,24 @@ OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& 
   return made;
 }
 
+// Positions that are all the same come from a receiver that had no fix, and contradict every base.
+std::string why_nothing_is_oriented(const Block& block) {
+  constexpr double kSame_m = 1e-3;
+  const Frame* first = nullptr;
+  std::int64_t same = 0, others = 0;
+  for (const Frame& frame : block.frames) {
+    if (!frame.position_prior) continue;
+    if (first == nullptr) first = &frame;
+    const double distance = (frame.position_prior->position - first->position_prior->position).norm();
+    ++(distance < kSame_m ? same : others);
+  }
+  if (same > 1 && others == 0)
+    return fmt::format(
+        "no image could be oriented: all {} positions are the same; leave them out with "
+        "'gps: {{use: false}}', or give positions or approximate poses in a file ('poses')",
+        same);
+  return "no image could be oriented from the matches; check that images overlap and that focal lengths are right, "
+         "leave out wrong GPS positions ('gps: {use: false}'), or give approximate poses ('poses')";
+}
+
 }  // namespace megablock

@@ -20,4 +20,7 @@ struct OrientationStage {
 OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& record,
                                  const std::vector<std::string>& matches, std::vector<SeenVertical>& verticals);
 
+// The message for a block of which no image could be oriented: the likely cause and the remedy.
+std::string why_nothing_is_oriented(const Block& block);
+
 }  // namespace megablock
