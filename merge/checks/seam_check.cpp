@@ -34,6 +34,7 @@
 
 #include "geometry/numbers/chi_square.h"
 #include "geometry/numbers/decompositions.h"
+#include "geometry/numbers/student.h"
 
 extern "C" {
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
@@ -173,9 +174,6 @@ class CovarianceRoot {
   Eigen::VectorXd scale_;
   SemidefiniteFactor factor_;
 };
-
-// The probability that a standard normal variable exceeds `deviate`.
-double normal_exceeds(double deviate) { return 0.5 * std::erfc(deviate / std::sqrt(2.0)); }
 
 // The quantiles of one alarm probability, computed once for each number of degrees.
 class Limits {
