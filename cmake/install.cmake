@@ -17,6 +17,7 @@ set(package_folder lib/cmake/megablock)
 install(TARGETS megablock megablock_image_codecs RUNTIME DESTINATION bin LIBRARY DESTINATION lib/megablock)
 install(DIRECTORY cluster/templates/ DESTINATION share/megablock)
 install(FILES LICENSE README.md DESTINATION share/doc/megablock)
+install(DIRECTORY LICENSES DESTINATION share/doc/megablock)
 install(DIRECTORY docs DESTINATION share/doc/megablock)
 
 set(library_targets megablock_base)

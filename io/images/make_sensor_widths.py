@@ -56,8 +56,13 @@ for make, model, width, source in rows:
     if width > 0:
         known.setdefault((plain(make), plain(model)), (width, source))
 print("# Sensor widths: the larger side in mm. Made by make_sensor_widths.py, not by hand.")
-print("# maker: makers' data sheets (sensor_widths_makers.csv). colmap: COLMAP 3.8, src/util/camera_specs.cc, copyright")
-print("# ETH Zurich and UNC Chapel Hill, new BSD licence. Names are in lower case without spaces and signs.")
+print("# maker: makers' data sheets (sensor_widths_makers.csv).")
+if options.colmap:
+    print("# colmap: COLMAP 3.8, src/util/camera_specs.cc, copyright ETH Zurich and UNC Chapel Hill, new BSD licence")
+    print("# (LICENSES/colmap.txt).")
+if options.opensfm:
+    print("# opensfm: OpenSfM, opensfm/data/sensor_data.json, copyright Mapillary AB, 2-clause BSD licence.")
+print("# Names are in lower case without spaces and signs.")
 print("make,model,width_mm,source")
 for (make, model), (width, source) in sorted(known.items()):
     print(f"{make},{model},{width:g},{source}")
