@@ -1,5 +1,5 @@
 // Links independent models by the points and images that they share, and gives a start for their joint adjustment
-// (Kalantari 2009, chapter 9: sub-blocks joined by similarities).
+// (Kalantari 2009, chapter 9: models joined by similarities).
 //
 // Every two models that share points or images get a robust similarity (model_link.h). The trust in a link is its
 // number of inliers times the share of its triangles that close within their covariances. The spanning tree of the most

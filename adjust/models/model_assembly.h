@@ -1,4 +1,4 @@
-// Joins independent models (pairs, sub-blocks or tiles, each in a frame of its own) to one block by one similarity
+// Joins independent models (pairs of images or tiles, each in a frame of its own) to one block by one similarity
 // each: the block adjustment of independent models (Kalantari 2009, chapter 9).
 //
 // The links between models give a start, first chained along the most trusted ones and then averaged (linked_models.h).

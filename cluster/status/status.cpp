@@ -135,7 +135,7 @@ std::string figures_text(const Json& json) {
       number("oriented"), counted(number("images"), "image"), counted(number("points"), "point"),
       counted(number("observations"), "observation"), json["mean_reprojection_px"].get<double>(),
       json["chi2_per_dof"].get<double>(), json["image_sigma_px"].get<double>(), counted(number("tiles"), "tile"),
-      counted(number("boundary_frames"), "boundary frame"), counted(number("global_iterations"), "global iteration"),
+      counted(number("boundary_frames"), "separator frame"), counted(number("global_iterations"), "global iteration"),
       json["digest"].get<std::string>());
 }
 

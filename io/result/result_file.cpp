@@ -192,7 +192,7 @@ void get_observation_table(const Hdf5Reader& file, ObservationTable& table) {
 }
 
 void put_seams(Hdf5Writer& file, const std::vector<SeamCheck>& seams) {
-  file.group("seams", "chi-square test of each merge of two sub-blocks");
+  file.group("seams", "chi-square test of each merge of two groups of tiles");
   file.vector("seams/node", column(seams, [](const SeamCheck& s) { return s.node; }), {"", "of the merge tree"});
   file.vector("seams/statistic", column(seams, [](const SeamCheck& s) { return s.statistic; }));
   file.vector("seams/degrees", column(seams, [](const SeamCheck& s) { return s.degrees; }));

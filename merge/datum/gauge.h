@@ -56,7 +56,7 @@ using Matrix77 = Eigen::Matrix<double, 7, 7>;
 // every rank gathers the parts of all tiles: the datum of the block follows from them alone.
 struct GaugePart {
   std::vector<std::int64_t> boundary_frames;  // frames that other tiles may share, ascending indices of the block
-  std::int64_t frames = 0;                    // number of frames of the part, boundary frames included
+  std::int64_t frames = 0;                    // number of frames of the part, separator frames included
   std::int64_t lowest_frame = -1;             // index in the block
   Eigen::Vector3d lowest_centre = Eigen::Vector3d::Zero();
   // The second frame of the minimal constraints, far from the first one, is chosen among these.

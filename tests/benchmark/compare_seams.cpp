@@ -1,4 +1,4 @@
-// Compares the seam check with the best possible test. The observations that a tile has of two boundary frames are
+// Compares the seam check with the best possible test. The observations that a tile has of two separator frames are
 // turned by 1e-4 rad (docs/results/whole-blocks.md, "Seam check"), for every tile of every block in turn. The alarm
 // limits are those of a block of 200 tiles, whatever the number of tiles.
 //

@@ -6,7 +6,7 @@ figures are sqrt(mean of e'C^-1 e / 3) over the frames or check points of a bloc
 posterior covariance times the a-posteriori variance factor. Their root mean square over the seeds is 1 if the sigmas
 are true. Single seeds scatter, because the errors of the frames of a block are correlated.
 
-With --tile-max-frames, interior frames and boundary frames, which several tiles touch, are evaluated separately too.
+With --tile-max-frames, interior frames and separator frames, which several tiles touch, are evaluated separately too.
 
 The blocks have rendered images by default (about 30 s of processor time per seed). With --tie-points they have tie
 points with exact Gaussian noise (1 s per seed). With --verify, the root mean squares must be 1 within four of their

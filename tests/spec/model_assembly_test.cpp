@@ -1,4 +1,4 @@
-// Acceptance test of the joint adjustment of independent models (M51, M52): 400 sub-blocks of 250 images in a grid of
+// Acceptance test of the joint adjustment of independent models (M51, M52): 400 models of 250 images in a grid of
 // 20 x 20, sides of 2000 units, 20 % overlap, places known to 0.1 unit; 5 % of the shared points wrong, and 5 % of the
 // links: half of those between neighbours that agree in another similarity, half between blocks that are nowhere near.
 #include <gtest/gtest.h>

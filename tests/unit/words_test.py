@@ -39,7 +39,8 @@ WORDS = [
     (r"\bcells? of the partition\b", "tile", None),
     (r"\bwhat (a|its|the) child(ren)? pass(es)? up\b", "update", None),
     (r"\bthat which\b", "a noun", None),
-    (r"\bsub-blocks? of frames\b", "tile", None),
+    (r"\bboundary frames?\b", "separator frame", None),
+    (r"\bsub-?blocks?\b", "model, tile", None),
 ]
 WORDS = [(re.compile(word, re.IGNORECASE), say, re.compile(allowed, re.IGNORECASE) if allowed else None)
          for word, say, allowed in WORDS]

@@ -37,7 +37,7 @@ std::string draw_density(const ResidualField& field, const Camera& camera);
 std::string draw_horizontal(const std::vector<PositionResidual>& residuals);
 std::string draw_vertical(const std::vector<PositionResidual>& residuals);
 
-// Draws the selected frames: coloured by tile, with rings around boundary frames, and crosses for frames that are not
+// Draws the selected frames: coloured by tile, with rings around separator frames, and crosses for frames that are not
 // oriented. Tie points are the background; links between frames are drawn too, and control and check points if the
 // frames are `placed` in the ground frame. The layers have classes, so that the script of the page can hide them.
 // `unit` is that of lengths. `after_reading` is that of ReportContext, here and below.

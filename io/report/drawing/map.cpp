@@ -127,7 +127,7 @@ class MapDrawing {
            "\"/></g>";
   }
 
-  // The frames, one path per colour: rings of the boundary frames below, dots above.
+  // The frames, one path per colour: rings of the separator frames below, dots above.
   std::string frames() const {
     const std::vector<std::size_t> colour = tile_colours(result_, after_reading_);
     const std::size_t step = 1 + places_.size() / kMostMarks;
@@ -166,7 +166,7 @@ class MapDrawing {
       words += ": not oriented";
     } else if (result_.tiles.tile_of_frame.contains(f) && result_.tiles.tile_of_frame[f].valid()) {
       words += ": tile " + count(result_.tiles.tile_of_frame[f].value);
-      if (result_.boundary.contains(f) && result_.boundary[f]) words += ", boundary frame";
+      if (result_.boundary.contains(f) && result_.boundary[f]) words += ", separator frame";
     }
     return fmt::format("<circle cx={:.1f} cy={:.1f} r={:.1f} fill=transparent><title>{}</title></circle>", p.x(), p.y(),
                        size, words);
@@ -202,7 +202,7 @@ std::string draw_map(const BlockResult& result, const FrameSelection& selected, 
 
 std::string map_legend(const BlockResult& result, const Figures& figures) {
   std::string text = "<span class=key><i class=tilekey></i>frames, one colour per tile</span>";
-  if (figures.boundary_frames) text += "<span class=key><i class=ringkey></i>boundary frame</span>";
+  if (figures.boundary_frames) text += "<span class=key><i class=ringkey></i>separator frame</span>";
   if (!figures.not_oriented.empty()) text += "<span class=key><b class=lostkey>×</b>not oriented</span>";
   bool control = false, check = false;
   for (const ControlPoint& point : result.block.control_points)

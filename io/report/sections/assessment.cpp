@@ -184,7 +184,7 @@ std::string headline(const BlockResult& result, const Figures& f) {
                   "per pixel in object space", "median");
   }
   cards += card(count(result.tiles.tile_count), result.tiles.tile_count == 1 ? "tile" : "tiles",
-                count(f.boundary_frames) + " boundary frames");
+                count(f.boundary_frames) + " separator frames");
   cards += card(count(result.global_iterations), "global iterations",
                 result.global_iterations > 0 ? "Newton decrement " + significant(result.newton_decrement, 2) : "");
   if (seconds > 0) cards += card(duration(seconds), "all stages", "peak memory " + memory(peak) + " a rank");

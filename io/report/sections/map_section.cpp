@@ -62,7 +62,7 @@ std::string caption_of(const BlockResult& result, const Figures& f, const MapSub
 
 std::string map_controls() {
   return "<p class=controls><label><input type=checkbox data-layer=points checked> tie points</label>"
-         "<label><input type=checkbox data-layer=boundary checked> boundary frames</label>"
+         "<label><input type=checkbox data-layer=boundary checked> separator frames</label>"
          "<label><input type=checkbox data-layer=links> links</label>"
          "<button type=button id=whole>whole block</button>"
          "<span class=muted>wheel or pinch to enlarge, drag to move</span></p>";

@@ -60,14 +60,14 @@ std::string tiles_section(const BlockResult& result, const Figures& f) {
   if (result.tiles.tile_count == 0) return "";
   const std::int32_t levels = result.tiles.tree.nodes.empty() ? 0 : result.tiles.tree.nodes.back().level;
   std::string body =
-      paragraph(fmt::format("{} {} in a merge tree of {} {}; {} of {} oriented frames ({}) are boundary frames. {} "
+      paragraph(fmt::format("{} {} in a merge tree of {} {}; {} of {} oriented frames ({}) are separator frames. {} "
                             "weak links between tiles were "
                             "dropped.",
                             count(result.tiles.tile_count), result.tiles.tile_count == 1 ? "tile" : "tiles", levels + 1,
                             levels == 0 ? "level" : "levels", count(f.boundary_frames), count(f.oriented_frames),
                             percent(static_cast<double>(f.boundary_frames), static_cast<double>(f.oriented_frames)),
                             count(static_cast<std::int64_t>(result.tiles.dropped_links.size()))));
-  Table tiles({"tile", "frames", "boundary", "observations", "rms [px]"}, 0);
+  Table tiles({"tile", "frames", "separator", "observations", "rms [px]"}, 0);
   const std::size_t listed = std::min(kTilesListed, f.tile_frames.size());
   for (std::size_t t = 0; t < listed; ++t)
     tiles.add({count(static_cast<std::int64_t>(t)), count(f.tile_frames[t]), count(f.tile_boundary[t]),

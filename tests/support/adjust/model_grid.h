@@ -1,4 +1,4 @@
-// Simulates sub-blocks in a grid, each in its own coordinate system: points and images that neighbours share, with
+// Simulates models in a grid, each in its own coordinate system: points and images that neighbours share, with
 // noise, wrong points and wrong links. Counts how many of these an assembly finds.
 #pragma once
 
@@ -18,7 +18,7 @@ namespace megablock::model_grid {
 struct Options {
   int rows = 4, columns = 4;
   double side = 2000, overlap = 0.2;
-  double images_per_side = 16;  // of a sub-block; 0: none
+  double images_per_side = 16;  // of a model; 0: none
   double points_per_side = 20;
   double relief = 100;
   double sigma = 0.1, rotation_sigma = 1e-4;  // units, rad

@@ -1,4 +1,4 @@
-// Falsifies the observations that a tile has of two boundary frames, which the seam check must find.
+// Falsifies the observations that a tile has of two separator frames, which the seam check must find.
 #pragma once
 
 #include <algorithm>

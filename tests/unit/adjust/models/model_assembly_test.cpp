@@ -1,4 +1,4 @@
-// Sub-blocks of a known grid, each in a frame of its own, come together again.
+// Models of a known grid, each in a frame of its own, come together again.
 #include "adjust/models/model_assembly.h"
 
 #include <gtest/gtest.h>
