@@ -38,8 +38,9 @@ IndexedVector<FrameIndex, const Mount*> single_mounts(const Block& block) {
   for (ImageIndex i(0); block.images.contains(i); ++i.value) {
     const FrameIndex frame = block.images[i].frame;
     if (mounts[frame])
-      throw InputError("coplanarity: frame '" + block.frames[frame].name +
-                       "' has several images; the determinant method takes single cameras only");
+      throw InputError(
+          "coplanarity: frame '" + block.frames[frame].name +
+          "' has several images; the determinant method takes single cameras only; use 'megablock run' for rigs");
     mounts[frame] = &block.mount_of(i);
   }
   return mounts;

@@ -290,7 +290,7 @@ class TileBuilder {
 
 void check_sizes(const Block& block, const BlockState& state, const Tiles& tiles) {
   if (state.oriented.size() != block.frames.size() || tiles.tile_of_frame.size() != block.frames.size())
-    throw InputError("the block's state or tiles have another number of frames than the block");
+    throw ComputeError("the block's state or tiles have another number of frames than the block");
 }
 
 }  // namespace

@@ -125,7 +125,7 @@ Eigen::Vector3d Georeference::to_local(const Geodetic& position) const {
 
 Geodetic Georeference::to_geodetic(const Eigen::Vector3d& local) const {
   Eigen::Vector3d xyz = local;
-  if (!transform_->apply(PJ_INV, xyz)) throw InputError("a local position has no WGS84 coordinates");
+  if (!transform_->apply(PJ_INV, xyz)) throw InputError("a local position has no WGS84 coordinates; check 'origin'");
   return {xyz.y(), xyz.x(), xyz.z()};
 }
 
@@ -175,7 +175,9 @@ Geodetic CrsToWgs84::to_wgs84(const Eigen::Vector3d& xyz) const {
 
 Eigen::Vector3d CrsToWgs84::from_wgs84(const Geodetic& position) const {
   Eigen::Vector3d p(position.longitude_deg, position.latitude_deg, position.height_m);
-  if (!transform_->apply(PJ_INV, p)) throw InputError("a WGS84 position cannot be transformed to " + crs_);
+  if (!transform_->apply(PJ_INV, p))
+    throw InputError("a WGS84 position cannot be transformed to " + crs_ +
+                     "; check that 'origin' lies in the area of that system");
   return p;
 }
 

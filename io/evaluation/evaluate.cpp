@@ -80,7 +80,8 @@ std::vector<Match> match_by_name(const BlockResult& result, const PoseTable& tru
   }
   if (matches.empty())
     throw InputError("no oriented frame of the result has a true pose of the same name; the truth begins with '" +
-                     (truth.names.empty() ? std::string() : truth.names.front()) + "'");
+                     (truth.names.empty() ? std::string() : truth.names.front()) +
+                     "'; give a truth whose names are those of frames or images");
   return matches;
 }
 

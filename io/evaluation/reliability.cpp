@@ -21,7 +21,7 @@ double normal_critical_value(double probability) { return normal_quantile(0.5 * 
 
 double tau_critical_value(std::int64_t degrees_of_freedom, double probability) {
   if (degrees_of_freedom < 1)
-    throw InputError("no test of residuals with " + std::to_string(degrees_of_freedom) + " degrees of freedom");
+    throw ComputeError("no test of residuals with " + std::to_string(degrees_of_freedom) + " degrees of freedom");
   if (degrees_of_freedom == 1) return 1;
   const auto f = static_cast<double>(degrees_of_freedom);
   const double t = student_quantile(0.5 * probability, f - 1);

@@ -32,7 +32,7 @@ double tau_statistic(double normalised, double sigma_0);
 // The value that |w| exceeds with this probability: 3.29 for 0.001.
 double normal_critical_value(double probability = kFalseAlarmProbability);
 // The value that |tau| exceeds with this probability: sqrt(f) t / sqrt(f - 1 + t^2), with t from Student's distribution
-// with f - 1 degrees of freedom at probability / 2. It is 1 for one degree of freedom. Throws InputError for fewer.
+// with f - 1 degrees of freedom at probability / 2. It is 1 for one degree of freedom. Throws ComputeError for fewer.
 double tau_critical_value(std::int64_t degrees_of_freedom, double probability = kFalseAlarmProbability);
 // The probability of a false alarm that each of `count` tests must have, so that all together raise one with
 // `probability`.

@@ -159,8 +159,9 @@ bool is_image_name(const std::string& path) {
 ImageHeader read_image_header(const std::string& path) {
   std::error_code error_code;
   const auto size = std::filesystem::file_size(path, error_code);
-  if (error_code) throw InputError("cannot be read: " + error_code.message());
-  if (size == 0) throw InputError("the file is empty");
+  if (error_code)
+    throw InputError("cannot be read: " + error_code.message() + "; check the path, or copy the image again");
+  if (size == 0) throw InputError("the file is empty; copy the image again");
 
   const std::lock_guard lock(exiv2_mutex());
   // Exiv2 would print warnings about harmless errors in the metadata of many cameras.
@@ -172,7 +173,8 @@ ImageHeader read_image_header(const std::string& path) {
     header.width = image->pixelWidth();
     header.height = image->pixelHeight();
     const ExifFields exif(image->exifData());
-    if (header.width <= 0 || header.height <= 0) throw InputError("the header gives no image size: truncated file?");
+    if (header.width <= 0 || header.height <= 0)
+      throw InputError("the header gives no image size; the file may be truncated; copy the image again");
     header.make = exif.text("Exif.Image.Make");
     header.model = exif.text("Exif.Image.Model");
     const double orientation = exif.number("Exif.Image.Orientation");

@@ -30,7 +30,7 @@ void hold_except(const YAML::Node& list, const std::string& where, Camera& camer
     for (const int p : parameters_named(model, item.IsScalar() ? item.Scalar() : "", where)) {
       if (is_fixed(model, p))
         throw InputError(where + ": calibrate: '" + parameter_name(model, p) + "' of the model " + model_name(model) +
-                         " follows from the size of the image and cannot be estimated");
+                         " follows from the size of the image and cannot be estimated; take it out of 'calibrate'");
       // The cx of a panorama is held by default and has no sigma. If it is to be estimated, it gets the sigma of cy.
       const int like = camera.prior_sigma[static_cast<std::size_t>(p)] > 0 ? p : static_cast<int>(kPrincipalY);
       sigma[static_cast<std::size_t>(p)] = camera.prior_sigma[static_cast<std::size_t>(like)];

@@ -40,7 +40,8 @@ std::optional<ControlTable> read_control(YamlReader& top) {
   if (!node->IsMap()) return read_control_table(*top.existing_file("control"));
   YamlReader control = *top.mapping("control");
   const auto file = control.existing_file("file");
-  if (!file) throw InputError(control.where() + ": key 'file' is missing in 'control'");
+  if (!file)
+    throw InputError(control.where() + ": key 'file' is missing in 'control'; write 'control: {file: points.csv}'");
   ControlTable table = read_control_table(*file);
   set_sigmas(control, table);
   set_check_points(control, table);

@@ -179,7 +179,7 @@ TrainedFilter train_filter(const std::vector<LabelledMatch>& matches, const Trai
     if (half < kFolds || kind.size() <= half)
       throw InputError("match filter: " + std::to_string(of_kind[1].size()) + " right and " +
                        std::to_string(of_kind[0].size()) + " wrong matches are too few to train on " +
-                       std::to_string(half) + " of each and to test on others");
+                       std::to_string(half) + " of each and to test on others; take a larger block or fewer samples");
   std::mt19937_64 generator(options.seed);
   for (auto& kind : of_kind) shuffle(kind, generator);
   std::vector<const LabelledMatch*> training;

@@ -126,7 +126,8 @@ void StaticRegionFinder::add(cv::Mat gradients, const cv::Size& image_size) {
   if (images() > 0 && image_size != image_size_)
     throw InputError("static regions: an image of " + std::to_string(image_size.width) + " x " +
                      std::to_string(image_size.height) + " pixels among images of " +
-                     std::to_string(image_size_.width) + " x " + std::to_string(image_size_.height));
+                     std::to_string(image_size_.width) + " x " + std::to_string(image_size_.height) +
+                     "; give it a camera of its own");
   image_size_ = image_size;
   gradients_.push_back(std::move(gradients));
 }
@@ -134,7 +135,8 @@ void StaticRegionFinder::add(cv::Mat gradients, const cv::Size& image_size) {
 cv::Mat StaticRegionFinder::mask() const {
   if (images() < options_.min_images)
     throw InputError("static regions: " + std::to_string(images()) + " images are too few; at least " +
-                     std::to_string(options_.min_images) + " are needed to tell the vehicle from the scene");
+                     std::to_string(options_.min_images) +
+                     " are needed to tell the vehicle from the scene; add images, or lower --min-images");
   const Variation v = variation_of(gradients_);
   std::vector<float> typical(v.usual.begin<float>(), v.usual.end<float>());
   const double t = std::clamp(options_.variation_share * quantile(typical, 0.75), kLeastVariation, kMostVariation);

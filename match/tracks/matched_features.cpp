@@ -19,7 +19,7 @@ void MatchedFeatures::mark(ImageIndex image, const std::vector<std::int32_t>& ro
   if (rows.empty()) return;
   const auto [lowest, highest] = std::minmax_element(rows.begin(), rows.end());
   if (!images_.contains(image) || *lowest < 0)
-    throw InputError("matches of image " + std::to_string(image.value) + ": the image or the feature does not exist");
+    throw ComputeError("matches of image " + std::to_string(image.value) + ": the image or the feature does not exist");
   // One bit per feature; the vector grows to the largest marked row only.
   std::vector<std::uint64_t>& words = images_[image].words;
   const std::size_t needed = static_cast<std::size_t>(*highest) / kWordBits + 1;

@@ -19,7 +19,7 @@ class MatchedFeatures {
   explicit MatchedFeatures(std::size_t images) : images_(images) {}
 
   // Marks the features of an image that have matches, in any order, repeatedly if needed. Call before number(). Throws
-  // InputError for images and rows that cannot exist.
+  // ComputeError for images and rows that cannot exist.
   void mark(ImageIndex image, const std::vector<std::int32_t>& rows);
   // Assigns the numbers. Call once, after all marks. Throws InputError for more features than a FeatureNumber can
   // count.

@@ -38,7 +38,8 @@ class TrackBuilder {
  public:
   explicit TrackBuilder(std::size_t images, MatchMemory memory = {});
   ~TrackBuilder();
-  // Adds the matches of a pair, in any order. Throws InputError for images or features that cannot exist.
+  // Adds the matches of a pair, in any order. Throws ComputeError for images or features that cannot exist, and
+  // InputError for a pair whose parts do not fit together.
   void add(const VerifiedPair& pair, std::int32_t generation = 0);
   // Builds the tracks. Call once, after all pairs.
   void build();

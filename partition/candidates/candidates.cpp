@@ -323,8 +323,8 @@ void append_cell(CandidateGraph& graph, const std::vector<std::int64_t>& rows) {
 
 void check_descriptors(const Block& block, const GlobalDescriptors& descriptors) {
   if (descriptors.empty() || descriptors.size() == block.images.size()) return;
-  throw InputError("candidate pairs: " + std::to_string(descriptors.size()) + " global descriptors for " +
-                   std::to_string(block.images.size()) + " images; one per image or none is needed");
+  throw ComputeError("candidate pairs: " + std::to_string(descriptors.size()) + " global descriptors for " +
+                     std::to_string(block.images.size()) + " images; one per image or none is needed");
 }
 
 }  // namespace

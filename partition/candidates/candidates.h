@@ -43,7 +43,7 @@ using GlobalDescriptors = IndexedVector<ImageIndex, std::array<float, 128>>;
 //
 // Pairs and cells do not depend on the order of the images in the block; ties are broken by name. Cells are fixed
 // squares of the ground frame, halved where they hold too many pairs, so they do not move when the block grows. Throws
-// InputError for impossible options and a wrong number of descriptors.
+// InputError for impossible options, and ComputeError for a wrong number of descriptors.
 CandidateGraph candidate_pairs(const Block& block, const GlobalDescriptors& global_descriptors,
                                const CandidateOptions& options);
 

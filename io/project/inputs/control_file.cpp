@@ -126,7 +126,7 @@ class JsonLines {
 double json_number(const Json& object, const char* key, const std::string& where) {
   const auto found = object.find(key);
   if (found == object.end() || !found->is_number())
-    throw InputError(where + ": '" + std::string(key) + "' is missing or not a number");
+    throw InputError(where + ": '" + std::string(key) + "' is missing or not a number; write it as a number");
   return found->get<double>();
 }
 
@@ -168,7 +168,8 @@ ControlTable read_json(const std::string& text, const std::string& path) {
   } catch (const Json::parse_error& error) {
     const auto begin = text.begin();
     const auto at = begin + static_cast<std::ptrdiff_t>(std::min(error.byte, text.size()));
-    throw InputError(path + ":" + std::to_string(1 + std::count(begin, at, '\n')) + ": not valid JSON");
+    throw InputError(path + ":" + std::to_string(1 + std::count(begin, at, '\n')) +
+                     ": not valid JSON: " + error.what());
   }
   if (!json.is_object() || !json.contains("points") || !json["points"].is_array())
     throw InputError(path + ":1: expected an object with a list 'points'");

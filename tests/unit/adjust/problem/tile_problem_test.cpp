@@ -220,7 +220,7 @@ TEST_F(TwoTiles, RefusesBadInput) {
   EXPECT_THROW(make(0), InputError);
   options_ = {};
   tiles_.tile_of_frame.pop_back();
-  EXPECT_THROW(make(0), InputError);
+  EXPECT_THROW(make(0), ComputeError);
 }
 
 // Whatever the tiles, their residuals together are those of the whole block.

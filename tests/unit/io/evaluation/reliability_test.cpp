@@ -50,7 +50,7 @@ TEST(Reliability, TauOfFewDegrees) {
     EXPECT_NEAR(tau_critical_value(3, p), std::sqrt(3.0) * (1 - p), 1e-12);
   }
   EXPECT_NEAR(tau_critical_value(1'000'000'000, 0.001), normal_critical_value(), 1e-7);
-  EXPECT_THROW(tau_critical_value(0), InputError);
+  EXPECT_THROW(tau_critical_value(0), ComputeError);
 }
 
 // Upper bounds of the largest standardised residual of a straight line through n points, tests at probability / n (Lund

@@ -225,9 +225,9 @@ TEST(Tracks, NothingMatchedGivesNone) {
 
 TEST(Tracks, BadPairsAreRefused) {
   const Keypoints keypoints = make_keypoints(2, 3);
-  EXPECT_THROW(build_tracks(keypoints, {make_pair(0, 2, {{0, 0}})}, {}), InputError);
+  EXPECT_THROW(build_tracks(keypoints, {make_pair(0, 2, {{0, 0}})}, {}), ComputeError);
   EXPECT_THROW(build_tracks(keypoints, {make_pair(0, 1, {{0, 3}})}, {}), InputError);
-  EXPECT_THROW(build_tracks(keypoints, {make_pair(0, 1, {{-1, 0}})}, {}), InputError);
+  EXPECT_THROW(build_tracks(keypoints, {make_pair(0, 1, {{-1, 0}})}, {}), ComputeError);
   VerifiedPair uneven = make_pair(0, 1, {{0, 0}});
   uneven.feature_b.push_back(1);
   EXPECT_THROW(build_tracks(keypoints, {uneven}, {}), InputError);

@@ -426,7 +426,7 @@ TEST(CandidateOptions, Checked) {
   options = {};
   options.cell_pairs = 0;
   EXPECT_THROW(options.check(), InputError);
-  EXPECT_THROW(candidate_pairs(block, random_descriptors(5, 1), {}), InputError);
+  EXPECT_THROW(candidate_pairs(block, random_descriptors(5, 1), {}), ComputeError);
 }
 
 }  // namespace
