@@ -1,6 +1,6 @@
-// The test of a link. The squared residual of a place, or of an attitude, is chi-square with three degrees of freedom;
-// the limit is the value that it exceeds with `rejection_probability`. The first limit is kSampleReach^2 times as large
-// and falls by a factor of four in each round: the similarity of three places is inexact away from them.
+// Tests a link. The squared residual of a place, or of an attitude, is chi-square with three degrees of freedom; the
+// limit is the value that it exceeds with `rejection_probability`. The first limit is kSampleReach^2 times as large and
+// falls by a factor of four in each round: the similarity of three places is inexact away from them.
 //
 // With `scale_sigmas` the variances are known up to a factor for places and one for attitudes. Both follow from
 // medians. Of m equations, 7 are used up by the similarity, so that the median of a squared residual is expected to be
@@ -216,8 +216,9 @@ class LinkEstimator {
 // The number of equations that a link needs.
 int fewest(const LinkOptions& options) { return 7 + options.min_redundancy; }
 
-// The best sample, with its inliers. With known sigmas the threshold is kSampleReach times the limit of a place; with
-// sigmas up to a factor it is found a contrario, or is the extent of what is shared.
+// The best sample, with its inliers. With known sigmas the threshold is kSampleReach times the limit of a place. If the
+// sigmas are known only up to a factor, the a-contrario method finds the threshold. Where it finds too few inliers, the
+// threshold is the extent of the shared points.
 std::optional<RansacResult<Similarity>> best_sample(const LinkEstimator& estimator, const LinkOptions& options,
                                                     double limit, std::uint64_t seed) {
   constexpr double kMiss = 1e-6;  // probability that every sample contains a wrong point
@@ -231,7 +232,7 @@ std::optional<RansacResult<Similarity>> best_sample(const LinkEstimator& estimat
   }
   const double extent = estimator.extent();
   if (!(extent > 0)) return std::nullopt;
-  // A place that is off by a tenth of what the models share says nothing.
+  // A point more than a tenth of the shared extent away is no evidence.
   sampling.max_threshold = 0.1 * extent;
   const auto found = ransac(estimator, sampling);
   if (found && estimator.equations(found->consensus.inlier) >= fewest(options)) return found;

@@ -1,11 +1,11 @@
 // Decides which tile, or which cell of a tile, owns a point or an observation of several frames.
 //
 // It is the one with most observations in those frames that separate the least (io/block/image_graph.h,
-// Tiles::separator_depth), or the lower number of equal ones. Suppose that frames separate the halves of the tree as
-// they should (partition/tiles/separators.h). Frames on different sides of a node then never occur in one point, unless
-// some of its frames are in the separator of this node or of a higher one. The points of the two sides have only these
+// Tiles::separator_depth); ties go to the lower number. Suppose that frames separate the halves of the tree as they
+// should (partition/tiles/separators.h). Frames on different sides of a node then never occur in one point, unless some
+// of its frames are in the separator of this node or of a higher one. The points of the two sides have only these
 // frames in common, and the separators in the tree are as small as possible. If simply most frames decided, separators
-// in aerial blocks would have half as many frames more.
+// in aerial blocks would have 50 % more frames.
 #pragma once
 
 #include <cstdint>

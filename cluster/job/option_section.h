@@ -1,4 +1,4 @@
-// A section of the project file with options of a stage.
+// Describes a section of the project file with options of a stage.
 //
 // One description of the options serves the project file, job.json and the fingerprints, so that no option can be read
 // without being hashed.
@@ -25,8 +25,8 @@ class OptionVisitor {
   virtual void choice(const std::string& key, const std::vector<std::string>& names, int& value) = 0;
 };
 
-// A section describes a struct of JobOptions. That of a stage whose few numbers nobody else reads stands in the file of
-// the stage and describes JobOptions::numbers:
+// A section describes a struct of JobOptions. If only the stage reads its options, the section is defined in the
+// stage's file and describes JobOptions::numbers:
 //
 //     visitor.number("min_share", options.numbers.try_emplace("coverage.min_share", 0.25).first->second);
 struct OptionSection {

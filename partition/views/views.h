@@ -1,5 +1,5 @@
-// Collects the knowledge about each image before anything is oriented: where it is, in which direction it looks, and
-// its place in the order of acquisition. Candidates are chosen by it.
+// Gives, for each image, its position, direction and place in the order of acquisition, before anything is oriented.
+// Candidates are chosen by it.
 #pragma once
 
 #include <Eigen/Core>

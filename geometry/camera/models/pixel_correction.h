@@ -1,5 +1,5 @@
-// What all models share that correct the measured pixel m, from the distorted to the undistorted position (Cannelle
-// 2013, section 2.2):
+// Gives the common code of the models that correct the measured pixel m, from the distorted to the undistorted position
+// (Cannelle 2013, section 2.2):
 //
 //     m + d(m) = (cx + f X/Z, cy + f Y/Z)                                                                      (1)
 //
