@@ -1,5 +1,6 @@
-// Projection of a point into an image, its inverse, and its derivatives, for every camera model. The formulas are in
-// models/, one file a model. Each model decides which points it sees; FieldOfView in models/model.h gives the rule.
+// Projects a point into an image, and inverts and differentiates the projection, for every camera model. The formulas
+// are in models/, one file a model. Each model decides which points it sees; FieldOfView in models/model.h gives the
+// rule.
 //
 // Points are in camera axes (x right, y down, z along the view) in any unit. Pixels have their centres at +0.5.
 #pragma once

@@ -1,5 +1,5 @@
-// The collinearity equations of one image ("image formula") with nine physical parameters and with eleven linear
-// parameters, the conversion between them, and their estimation from control points.
+// Evaluates the collinearity equations of one image ("image formula") with nine physical or eleven linear parameters,
+// converts one set into the other, and estimates them from control points.
 //
 // Physical parameters: the rotation R with rows L1, L2, L3 (ground -> image, y up, looking along -z), the projection
 // centre S, the principal point (x_p, y_p) and the principal distance p:

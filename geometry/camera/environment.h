@@ -1,4 +1,4 @@
-// Corrections of a viewing ray for refraction in the atmosphere and for the curvature of the earth.
+// Corrects a viewing ray for refraction in the atmosphere and for the curvature of the earth.
 //
 // Both turn a ray in its vertical plane by an amount that depends on its angle theta from the nadir. H and h are the
 // heights of camera and ground above sea level, D = H - h, and R is the earth's radius:

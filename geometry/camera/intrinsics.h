@@ -1,4 +1,4 @@
-// The values of a camera's parameters, with start values and priors. models/models.h is the table of the models.
+// Holds the values of a camera's parameters, with start values and priors. models/models.h is the table of the models.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
-// Least squares for equations that contain several observations, all with errors (the Gauss-Helmert model, also called
-// condition adjustment with unknowns; Kalantari 2009, chapter 5). Typical uses are a similarity between two sets of
-// measured points and the direction that measured planes have in common.
+// Solves least squares for equations that contain several observations, all with errors (the Gauss-Helmert model, also
+// called condition adjustment with unknowns; Kalantari 2009, chapter 5). Typical uses are a similarity between two sets
+// of measured points and the direction that measured planes have in common.
 //
 // The unknowns x and the observations l with covariance S satisfy f(x, l + v) = 0 and, where there are constraints,
 // g(x) = 0. Sought are the x and the corrections v for which v' S^-1 v is least. Linearised at x0 and l0 = l + v0, with

@@ -1,4 +1,4 @@
-// Random sample consensus (RANSAC) with local optimisation: estimates a model from observations with many outliers
+// Estimates a model from observations with many outliers, by random sample consensus (RANSAC) with local optimisation
 // (Kalantari 2009, chapters 7 and 8 and annex A).
 //
 // It draws minimal samples, computes a model from each, and keeps the model with most support, until it is unlikely

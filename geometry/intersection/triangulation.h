@@ -1,4 +1,4 @@
-// Intersection of the rays of one tie point from two or more images. There is one solution. The linear start follows
+// Intersects the rays of one tie point from two or more images. There is one solution. The linear start follows
 // Cannelle (2013, appendix C); R. Hartley and P. Sturm, "Triangulation", CVIU 68(2), 1997, show what it lacks and why a
 // refinement follows.
 //

@@ -1,4 +1,4 @@
-// Intersection of two rays in closed form: the midpoint of their shortest connection. There is one solution.
+// Intersects two rays in closed form. The point is the midpoint of their shortest connection. There is one solution.
 // triangulation.h takes any number of rays and minimises image residuals; this function is for inner loops.
 //
 // With the base m = C_2 - C_1 and unit directions d_1, d_2, the nearest points are C_1 + a d_1 and C_2 + b d_2, where

@@ -1,4 +1,4 @@
-// Conversion between degrees and radians.
+// Converts between degrees and radians.
 //
 // All angles inside the program are in radians. Files, options and messages give them in degrees, and convert with
 // these two factors where they are read or written.

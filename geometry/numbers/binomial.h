@@ -1,4 +1,4 @@
-// The upper tail of the binomial distribution. Tests against chance use it: how likely is it that so many of n
+// Gives the upper tail of the binomial distribution. Tests against chance use it: how likely is it that so many of n
 // independent trials succeed by accident?
 #pragma once
 

@@ -1,4 +1,5 @@
-// Tail probabilities and quantiles of the chi-square distribution, for tests of variances and of squared residuals.
+// Gives tail probabilities and quantiles of the chi-square distribution, for tests of variances and of squared
+// residuals.
 //
 // With d degrees of freedom, P(X > s) = Q(d / 2, s / 2), where Q is the regularised upper incomplete gamma function
 // as Boost.Math computes it.

@@ -1,4 +1,4 @@
-// Decompositions of small dense matrices: eigenvalues, singular values, QR, inverse and solution of normal equations.
+// Decomposes small dense matrices: eigenvalues, singular values, QR, inverse and solution of normal equations.
 //
 // Eigen's decompositions are templates, and to compile them takes most of the time of a build. This file compiles each
 // of them once; all other files call these functions instead.

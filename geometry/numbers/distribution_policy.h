@@ -1,4 +1,4 @@
-// How the distributions of Boost.Math are evaluated. Internal to geometry/numbers/.
+// Sets how Boost.Math evaluates its distributions. Internal to geometry/numbers/.
 //
 // All arithmetic is double, which is fast and gives the same bits on every processor. An argument outside the domain
 // gives NaN, and an overflow infinity, as the functions of <cmath> do; by default Boost.Math throws.

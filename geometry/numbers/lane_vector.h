@@ -1,5 +1,5 @@
-// Internal to the kernels. Vectors of doubles for code that treats several observations or points at once. Each element
-// of a vector (a "lane") holds the same quantity of another observation.
+// Gives the kernels vectors of doubles, for code that treats several observations or points at once. Each element of a
+// vector (a "lane") holds the same quantity of another observation.
 //
 // The kernels are compiled several times, once for each kind of processor. A kernel's source defines
 // MEGABLOCK_LANE_WIDTH (2, 4 or 8 doubles) and then includes this file; no other file may include it. All names are in

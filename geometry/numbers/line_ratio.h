@@ -1,4 +1,4 @@
-// A measure of how close points are to one straight line. Points on a line leave a rotation about it undetermined, so
+// Measures how close points are to one straight line. Points on a line leave a rotation about it undetermined, so
 // callers test for this before they trust a fit.
 #pragma once
 

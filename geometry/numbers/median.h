@@ -1,5 +1,5 @@
-// Median of a list of values. For an even number of values it is the upper of the two middle ones, not their mean; the
-// result is therefore always one of the values. Returns 0 for an empty list.
+// Gives the median of a list of values. For an even number of values it is the upper of the two middle ones, not their
+// mean; the result is therefore always one of the values. Returns 0 for an empty list.
 #pragma once
 
 #include <algorithm>

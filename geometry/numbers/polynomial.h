@@ -1,4 +1,5 @@
-// Polynomials of a degree known at compile time, and all their real roots. Minimal solvers end in such a polynomial.
+// Multiplies polynomials whose degree is known at compile time, and finds all their real roots. Minimal solvers end in
+// such a polynomial.
 //
 // Between two neighbouring extrema a polynomial is monotonic and has at most one root. So the roots of the derivatives,
 // from the last derivative to the first, bracket the roots of the polynomial. Within a bracket Newton's iteration finds

@@ -1,4 +1,5 @@
-// Least squares by rows: the triangular factor R of a matrix A with few columns, whose rows arrive one by one.
+// Solves least squares by rows. It keeps the triangular factor R of a matrix A with few columns, whose rows arrive one
+// by one.
 //
 // Givens rotations merge each row into R, so memory does not grow with the number of rows. R has the singular values
 // and right singular vectors of A. Normal equations A'A would give them too, but would square the condition number;

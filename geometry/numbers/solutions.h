@@ -1,4 +1,4 @@
-// A list of at most Capacity solutions of a minimal problem, held in place. A solver runs millions of times in RANSAC
+// Holds a list of at most Capacity solutions of a minimal problem, in place. A solver runs millions of times in RANSAC
 // and must not allocate memory. The interface is the part of std::vector that callers need.
 #pragma once
 

@@ -1,5 +1,5 @@
-// Tail probabilities and quantiles of the normal distribution and of Student's distribution, for confidence limits of
-// single values.
+// Gives tail probabilities and quantiles of the normal distribution and of Student's distribution, for confidence
+// limits of single values.
 //
 // The normal tail is erfc(v / sqrt 2) / 2. With d degrees of freedom, Student's tail is I_x(d / 2, 1 / 2) / 2 at
 // x = d / (d + v^2), where I is the regularised incomplete beta function. Boost.Math computes both.

@@ -1,5 +1,5 @@
-// Pose of a rig from three points, each seen by any of its cameras (the generalised three-point problem). There are up
-// to eight solutions.
+// Finds the pose of a rig from three points, each seen by any of its cameras (the generalised three-point problem).
+// There are up to eight solutions.
 //
 // In rig axes a ray starts at o_i and has the unit direction d_i; its point lies at o_i + s_i d_i with the unknown
 // distance s_i. The rig is rigid, so distances between the points are those on the ground:

@@ -1,5 +1,5 @@
-// Pose of a camera from three points (the perspective three-point problem, "space resection"). There are up to four
-// solutions.
+// Finds the pose of a camera from three points (the perspective three-point problem, "space resection"). There are up
+// to four solutions.
 //
 // The unknowns are the distances s_i of the points from the projection centre. With the angles between the rays known,
 // the triangle gives three cosine laws, quadrics in s:

@@ -1,4 +1,4 @@
-// The estimator that ransac.h uses for the pose of a camera, or of a rig of cameras, from rays to known points.
+// Gives the estimator that ransac.h uses for the pose of a camera, or of a rig of cameras, from rays to known points.
 //
 //     ResectionEstimator      3 rays; residual: angle between a ray and the direction to its point
 //

@@ -1,4 +1,4 @@
-// An observation as a ray of its rig, with residuals in pixels for every camera model.
+// Turns an observation into a ray of its rig, with residuals in pixels for every camera model.
 //
 // The pixel is seen along the unit vector v. B has two unit axes perpendicular to v as columns, and J = B' dv/dpixel is
 // how fast the ray turns with the pixel. A direction u that differs a little from v then has the residual, in pixels,

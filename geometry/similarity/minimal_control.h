@@ -1,6 +1,6 @@
-// Similarity of a model to control of which some points have only a height and others only a planimetric position:
-// seven equations for seven unknowns. A full control point counts as both. Kalantari (2009, chapter 9) counts the
-// equations; the solutions are derived here. Two mixes are minimal, and each has up to two solutions.
+// Finds the similarity of a model to control of which some points have only a height and others only a planimetric
+// position. There are seven equations for seven unknowns. A full control point counts as both. Kalantari (2009, chapter
+// 9) counts the equations; the solutions are derived here. Two mixes are minimal, and each has up to two solutions.
 //
 // Two planimetric points and three heights (for example two full points and one height). With Y = s R X + t, let
 // u = s r_3 be the scaled third row of R. Differences of heights give u . (X_i - X_1) = Z_i - Z_1, so u = u_0 + k n

@@ -1,4 +1,5 @@
-// Similarity y = s R x + t from three points in closed form (Kalantari 2009, chapter 9). There is one solution.
+// Finds the similarity y = s R x + t from three points in closed form (Kalantari 2009, chapter 9). There is one
+// solution.
 //
 // Let d be the difference of two points and e the same difference in the other system. Cayley's form of the rotation,
 // R = (I - [v]x)^-1 (I + [v]x), turns e = s R d into

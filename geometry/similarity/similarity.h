@@ -1,5 +1,5 @@
-// Similarity transformation (scale s, rotation R, translation t) between two sets of points: y = s R x + t. This file
-// has the transformation itself, its least-squares fit with covariance, and a robust fit. All have one solution.
+// Gives the similarity transformation y = s R x + t (scale s, rotation R, translation t) between two sets of points,
+// its least-squares fit with covariance, and a robust fit. All have one solution.
 //
 // Least squares are in closed form, with weights (S. Umeyama, "Least-squares estimation of transformation parameters
 // between two point patterns", IEEE PAMI 13(4), 1991). With centred points and the decomposition sum w y x' = U D V',

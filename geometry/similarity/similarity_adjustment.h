@@ -1,4 +1,5 @@
-// Similarity between two sets of points that both carry errors, with its covariance (Kalantari 2009, chapter 9).
+// Adjusts a similarity between two sets of points that both carry errors, with its covariance (Kalantari 2009, chapter
+// 9).
 //
 // The equation s R x + t - y = 0 holds for the corrected x and y: three equations and six observations a point, in the
 // Gauss-Helmert model (gauss_helmert.h). Increments are those of similarity.h. The adjustment refers to the centroids,

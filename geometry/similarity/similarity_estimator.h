@@ -1,4 +1,4 @@
-// The estimator that ransac.h uses for a similarity between two sets of points with many wrong pairs.
+// Gives the estimator that ransac.h uses for a similarity between two sets of points with many wrong pairs.
 //
 //     SimilarityEstimator      3 points (minimal_similarity.h); residual: |y - S x| in standard deviations
 //

@@ -1,5 +1,5 @@
-// Attitude of the aircraft that carries a camera, as yaw, pitch and roll. Many mapping programs exchange attitudes in
-// this form.
+// Converts the attitude of the aircraft that carries a camera from and to yaw, pitch and roll. Many mapping programs
+// exchange attitudes in this form.
 //
 // The body axes are x forward, y right, z down. The camera is taken as mounted like a nadir camera whose image has its
 // top forward: body x is the camera's -y, body y the camera's x, body z its viewing direction. The angles turn the body

@@ -1,4 +1,4 @@
-// Poses of frames and mounts, and the one chain of transformations from a ground point to a camera.
+// Gives the poses of frames and mounts, and the one chain of transformations from a ground point to a camera.
 //
 //     X_rig = R_frame (X - C_frame)
 //     X_cam = R_mount (X_rig - C_mount)

@@ -1,5 +1,5 @@
-// Rotations: unit quaternions for storage, tangent increments (rotation vectors) for estimation. A quaternion has four
-// numbers for three degrees of freedom; an increment has three and needs no constraint.
+// Gives rotations as unit quaternions for storage and as tangent increments (rotation vectors) for estimation. A
+// quaternion has four numbers for three degrees of freedom; an increment has three and needs no constraint.
 //
 // This convention holds in the whole project. The rotation R of a frame is R_cw: world -> camera (or rig). An increment
 // w (3-vector, radians) acts as a RIGHT perturbation:

@@ -1,4 +1,4 @@
-// Rotations that turn one direction, or one set of directions, into another.
+// Finds rotations that turn one direction, or one set of directions, into another.
 //
 // fit_rotation() minimises sum w |y - R x|^2 in closed form: with the singular value decomposition sum w y x' = U S V',
 // the best rotation is R = U diag(1, 1, det(U V')) V' (W. Kabsch, Acta Crystallographica A32, 1976).

@@ -1,5 +1,5 @@
-// Parameters of a rotation and of a unit base that turn the equations of relative orientation and of similarity into
-// polynomials (Kalantari 2009, chapter 7). Only minimal solvers need them; all other code uses the increments of
+// Gives parameters of a rotation and of a unit base that turn the equations of relative orientation and of similarity
+// into polynomials (Kalantari 2009, chapter 7). Only minimal solvers need them; all other code uses the increments of
 // rotation.h.
 //
 // Cayley's parameters are v = axis * tan(angle / 2), with R = (I - [v]x)^-1 (I + [v]x). Thompson's parameters (1959)

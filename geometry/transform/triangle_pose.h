@@ -1,5 +1,5 @@
-// The pose that moves one triangle onto a congruent one, in closed form. Resection solvers end here: they know the
-// three points in camera axes and in the ground frame.
+// Finds the pose that moves one triangle onto a congruent one, in closed form. Resection solvers end here: they know
+// the three points in camera axes and in the ground frame.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// Coplanarity determinant of a match between two cameras of known positions, with its ten derivatives. It is an
-// observation of the attitudes that needs no object point (A. Barrier and S. Martin, "Bundle adjustment with known
+// Gives the coplanarity determinant of a match between two cameras of known positions, with its ten derivatives. It is
+// an observation of the attitudes that needs no object point (A. Barrier and S. Martin, "Bundle adjustment with known
 // positions", report, ENS Paris-Saclay).
 //
 // Let d_1 and d_2 be the rays of one point in ground axes, not normalised, and m = C_2 - C_1 the base. The three are

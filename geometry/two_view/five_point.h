@@ -1,5 +1,5 @@
-// Relative orientation of two calibrated images from five points. There are up to ten essential matrices, and each has
-// four orientations.
+// Finds the relative orientation of two calibrated images from five points. There are up to ten essential matrices, and
+// each has four orientations.
 //
 // The five coplanarity equations b' E a = 0 are linear in E and leave E = x E1 + y E2 + z E3 + E4. E is essential if
 //

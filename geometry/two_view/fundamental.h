@@ -1,4 +1,4 @@
-// Fundamental and essential matrices from seven, eight or more points: b' F a = 0.
+// Finds fundamental and essential matrices, b' F a = 0, from seven, eight or more points.
 //
 // The equations are linear in the nine elements. For eight and more points the least-squares solution is brought to
 // rank two (F) or to the nearest essential matrix (E) afterwards. Pixels are first shifted to their mean and scaled to

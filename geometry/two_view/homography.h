@@ -1,4 +1,4 @@
-// Homography between two images of a plane, b ~ H a, and the relative orientations that explain it.
+// Finds the homography between two images of a plane, b ~ H a, and the relative orientations that explain it.
 //
 // A plane n.X = d in the axes of a gives X_b = R X_a + t = (R + t n'/d) X_a, so H = R + (t/d) n' once H is scaled to a
 // middle singular value of one and to positive depths. Decompose H'H = V diag(p, 1, q) V' with p >= 1 >= q. H preserves

@@ -1,5 +1,5 @@
-// Covariance of a relative orientation whose base is hardly determined. It comes from the cost itself, because the
-// curvature of the cost at the estimate does not describe such a base.
+// Gives the covariance of a relative orientation whose base is hardly determined. It comes from the cost itself,
+// because the curvature of the cost at the estimate does not describe such a base.
 //
 // The critical case is a plane that is seen with the base along its normal. To exchange base and normal leaves the
 // observations unchanged. Let z be the offset of the base from the middle between the two, as a complex number in the

@@ -1,5 +1,6 @@
-// Estimators that ransac.h uses for pairs of images. Points are normalised image points (X/Z, Y/Z), so residuals are in
-// units of the focal length, and one residual component has the standard deviation of an image coordinate.
+// Gives the estimators that ransac.h uses for pairs of images. Points are normalised image points (X/Z, Y/Z), so
+// residuals are in units of the focal length, and one residual component has the standard deviation of an image
+// coordinate.
 //
 //     FivePointEstimator      relative orientation        5 matches   Sampson distance, points in front of both
 //     VerticalPairEstimator   the same, verticals known   3 matches   the same; refined with free verticals

@@ -1,4 +1,4 @@
-// Matched points of two images, the input of all solvers and estimators of this folder.
+// Holds matched points of two images, the input of all solvers and estimators of this folder.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// Robust least-squares adjustment of a relative orientation over many matches, and its covariance. It needs a good
+// Adjusts a relative orientation to many matches, by robust least squares, and gives its covariance. It needs a good
 // approximation, such as the result of RANSAC. Residuals and unknowns are those of sampson.h: the Sampson distance in
 // normalised image coordinates, the increment w of the rotation, and the base along two axes across it.
 #pragma once

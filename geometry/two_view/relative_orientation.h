@@ -1,4 +1,4 @@
-// Relative orientation of two images: the type, and what all of its solvers need.
+// Gives the type of the relative orientation of two images, and functions that all its solvers need.
 //
 //     X_b = R X_a + t,  |t| = 1:    E = [t]x R,    b' E a = 0    for the rays a, b of one point (coplanarity)
 //

@@ -1,5 +1,5 @@
-// Rotation between two images with a common centre (or of very distant points) from two rays in each, b = R a. There is
-// one solution.
+// Finds the rotation between two images with a common centre (or of very distant points) from two rays in each, b = R
+// a. There is one solution.
 //
 // Each pair of rays spans an orthonormal system: their bisector, their normal, and the third axis. To turn one system
 // onto the other shares the misfit between both rays, as least squares does (rotation_fit.h takes more than two rays).

@@ -1,4 +1,4 @@
-// The Sampson residual of a match for a relative orientation, with its derivatives (P. D. Sampson, "Fitting conic
+// Gives the Sampson residual of a match for a relative orientation, with its derivatives (P. D. Sampson, "Fitting conic
 // sections to 'very scattered' data", CGIP 18, 1982). It needs no object point, so an adjustment has only five
 // unknowns.
 //

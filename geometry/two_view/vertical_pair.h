@@ -1,4 +1,5 @@
-// Relative orientation of two images whose verticals are known, from three points. There are up to four solutions.
+// Finds the relative orientation of two images whose verticals are known, from three points. There are up to four
+// solutions.
 //
 // The rays of each image are levelled first (vertical.h), so that the vertical becomes the axis Y (Kalantari 2009,
 // chapter 8). Of the rotation only a turn p about Y remains unknown. Three points are coplanar with the base t if

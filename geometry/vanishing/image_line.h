@@ -1,5 +1,5 @@
-// Straight lines in an image with their covariance (Kalantari 2009, chapter 2), and the feet of the perpendiculars from
-// the origin to them (chapter 5).
+// Gives straight lines in an image with their covariance (Kalantari 2009, chapter 2), and the feet of the
+// perpendiculars from the origin to them (chapter 5).
 //
 // A line is rho = -x sin(theta) + y cos(theta), where theta is its direction and rho its signed distance from the
 // origin, in pixels. Orthogonal regression fits it to n points with the centroid (xb, yb). With a = sum (x - xb)^2,

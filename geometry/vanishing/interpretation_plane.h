@@ -1,5 +1,5 @@
-// The interpretation plane of a line in an image: the plane through a perspective centre and the line, given by its
-// unit normal with covariance (Kalantari 2009, chapter 6).
+// Gives the interpretation plane of a line in an image: the plane through a perspective centre and the line, given by
+// its unit normal with covariance (Kalantari 2009, chapter 6).
 //
 // The planes of parallel lines all contain their common direction V, so V'N = 0. This holds for every centre on a
 // perpendicular to the image plane: lines that meet in a vanishing point P have planes that contain the line from the

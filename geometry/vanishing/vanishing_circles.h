@@ -1,4 +1,4 @@
-// Vanishing points by circles in the image (Kalantari 2009, chapter 5). They exist for comparison with
+// Finds vanishing points by circles in the image (Kalantari 2009, chapter 5). The circles exist for comparison with
 // vanishing_points.h, which uses the same statistics and needs no origin. Points are pixels, so one exactly at infinity
 // cannot be represented.
 //

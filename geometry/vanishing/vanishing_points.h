@@ -1,4 +1,5 @@
-// Vanishing points of the lines of one image, by interpretation planes on the unit sphere (Kalantari 2009, chapter 6).
+// Finds vanishing points of the lines of one image, by interpretation planes on the unit sphere (Kalantari 2009,
+// chapter 6).
 //
 // The interpretation planes of parallel lines have normals N on a great circle, whose pole is the vanishing point V
 // (interpretation_plane.h). The fullest great circle is found and its lines are removed, then the next, and so on.

@@ -1,6 +1,6 @@
-// The vanishing point with most votes among the intersections of all pairs of lines (C. Rother, "A new approach to
-// vanishing point detection in architectural environments", Image and Vision Computing 20(9-10), 2002; Kalantari 2009,
-// chapter 6). It exists for comparison with vanishing_points.h.
+// Finds the vanishing point with most votes among the intersections of all pairs of lines (C. Rother, "A new approach
+// to vanishing point detection in architectural environments", Image and Vision Computing 20(9-10), 2002; Kalantari
+// 2009, chapter 6). The function exists for comparison with vanishing_points.h.
 //
 // Each pair of planes proposes the direction N1 x N2 (interpretation_plane.h). Every line votes for the directions
 // close to its plane, with 1 - angle / tolerance. There is no adjustment, and two lines that meet far away hardly

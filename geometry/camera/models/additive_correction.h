@@ -1,5 +1,5 @@
-// Corrections of the measured pixel by functions over the image (see pixel_correction.h), which is scaled to [-1, 1]:
-// x = 2 m_x / width - 1, y = 2 m_y / height - 1. Each component of d is a sum of coefficients (pixels) times
+// Corrects the measured pixel by functions over the image (see pixel_correction.h), which is scaled to [-1, 1]: x = 2
+// m_x / width - 1, y = 2 m_y / height - 1. Each component of d is a sum of coefficients (pixels) times
 //     polynomial-N   x^i y^j,          1 <= i + j <= N
 //     legendre-N     P_i(x) P_j(y),    1 <= i + j <= N
 //     fourier-N      cos or sin of pi/2 (i x + j y),  0 <= i <= N, |j| <= N, i > 0 or j > 0   (period: two images)

@@ -1,4 +1,5 @@
-// Brown's model of radial and decentring distortion (D. C. Brown, 1971), with OpenCV's order and signs of parameters.
+// Gives Brown's model of radial and decentring distortion (D. C. Brown, 1971), with OpenCV's order and signs of
+// parameters.
 //
 //     x = X/Z, y = Y/Z,  r2 = x^2 + y^2,
 //     u = cx + f (x (1 + k1 r2 + k2 r2^2 + k3 r2^3) + 2 p1 x y + p2 (r2 + 2 x^2))

@@ -1,4 +1,4 @@
-// The stitched panorama: columns are azimuths, rows are elevations.
+// Gives the model of a stitched panorama: columns are azimuths, rows are elevations.
 //
 //     u = cx + f atan2(X, Z),  v = cy + f atan2(Y, |X, Z|),  f = width / 2 pi
 //

@@ -1,4 +1,4 @@
-// The equidistant fisheye of OpenCV (J. Kannala and S. Brandt, 2006).
+// Gives the equidistant fisheye of OpenCV (J. Kannala and S. Brandt, 2006).
 //
 //     t = angle between ray and axis, R = |X, Y|,  t_d = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8),
 //     u = cx + f t_d X/R,  v = cy + f t_d Y/R

@@ -1,4 +1,4 @@
-// The pinhole: an image without distortion.
+// Gives the pinhole, an image without distortion.
 //
 //     u = cx + f X/Z,  v = cy + f Y/Z
 #pragma once

@@ -1,4 +1,4 @@
-// Derivatives, with u = 1 px or f, rho = r/u, g = sum c_i rho^e_i:
+// Differentiates the corrections, with u = 1 px or f, rho = r/u, g = sum c_i rho^e_i:
 //     d_q = g I + q q' (sum e_i c_i rho^(e_i - 2)) / u^2,   d_s = -d_q,   d_c_i = q rho^e_i,
 //     d_f = -q/f sum e_i c_i rho^e_i   (u = f only)
 #include "geometry/camera/models/radial_correction.h"

@@ -1,5 +1,5 @@
-// Radial corrections of the measured pixel about a centre of symmetry s = (sx, sy) of their own (see
-// pixel_correction.h). With q = m - s, r = |q|, the correction is d = q g(r):
+// Corrects the measured pixel radially about the model's own centre of symmetry s = (sx, sy) (see pixel_correction.h).
+// With q = m - s, r = |q|, the correction is d = q g(r):
 //     ign-radial     g = a r^2 + b r^4 + c r^6           (pixels: the correction's length is a r^3 + b r^5 + c r^7)
 //     odd-radial-N   g = sum_i k_i (r/f)^(2i)            (length r^3, r^5, ... at r in focal lengths; i = 1 to N)
 //     even-radial-N  g = sum_i k_i (r/f)^(2i - 1)        (length r^2, r^4, ...)

@@ -1,5 +1,5 @@
-// The fisheye with decentring and thin prisms, COLMAP's THIN_PRISM_FISHEYE (J. Weng, P. Cohen and M. Herniou, 1992, for
-// the terms; applied to equidistant coordinates).
+// Gives the fisheye with decentring and thin prisms, COLMAP's THIN_PRISM_FISHEYE (J. Weng, P. Cohen and M. Herniou,
+// 1992, for the terms; applied to equidistant coordinates).
 //
 //     t = angle between ray and axis, R = |X, Y|,  a = t X/R, b = t Y/R,  r2 = a^2 + b^2 = t^2,
 //     g = 1 + k1 r2 + k2 r2^2 + k3 r2^3 + k4 r2^4,
