@@ -1,6 +1,6 @@
-// The derivation of the correction. Let u be coordinates in the tangent plane of the unit sphere at the ray of the
-// keypoint, and y = A u + 1/2 B(u, u) the image coordinates of u, to second order. A neighbourhood that would give the
-// image I0(y) under y = A u alone gives
+// Derives the correction. Let u be coordinates in the tangent plane of the unit sphere at the ray of the keypoint, and
+// y = A u + 1/2 B(u, u) the image coordinates of u, to second order. A neighbourhood that would give the image I0(y)
+// under y = A u alone gives
 //
 //     I(y) = I0(y - Q(y)),   Q_i(y) = y' S_i y,   S_i = 1/2 A^-T B_i A^-1.
 //

@@ -1,4 +1,4 @@
-// Eccentricity of keypoints: the image of the centre of a patch is not the centre of the patch's image.
+// Corrects keypoints for their eccentricity: the image of the centre of a patch is not the centre of the patch's image.
 //
 // A keypoint lies where the image correlates best with a round kernel, so it stands for a whole neighbourhood. A camera
 // maps neighbourhoods unevenly: away from the axis of a perspective image they are stretched outwards. Two cameras of a

@@ -1,5 +1,5 @@
-// Detection of the SIFT features of one image (D. Lowe, "Distinctive image features from scale-invariant keypoints",
-// IJCV 60(2), 2004), evenly distributed and with bytes for descriptors.
+// Detects the SIFT features of one image (D. Lowe, "Distinctive image features from scale-invariant keypoints", IJCV
+// 60(2), 2004), evenly distributed and with bytes for descriptors.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// A bag of words whose vocabulary needs no training. Seven fixed hyperplanes cut the space of descriptors into 128
-// cells (M. Charikar, "Similarity estimation techniques from rounding algorithms", STOC 2002: random hyperplane
+// Makes a bag of words whose vocabulary needs no training. Seven fixed hyperplanes cut the space of descriptors into
+// 128 cells (M. Charikar, "Similarity estimation techniques from rounding algorithms", STOC 2002: random hyperplane
 // hashing). The numbers of descriptors in the cells, square-rooted and normalised, are the vector of the image. The
 // normal of a hyperplane has as many elements +1 as -1; typical descriptors, which all have the same norm and no
 // negative element, then fall on both sides of it.

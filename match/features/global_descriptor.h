@@ -1,4 +1,4 @@
-// One vector for each image, computed from its SIFT descriptors. It serves to find images of the same place without
+// Computes one vector for each image from its SIFT descriptors. It serves to find images of the same place without
 // positions.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Errors of a match, given the relative orientation of its two images (Cannelle 2013). The match filter
+// Computes the errors of a match, given the relative orientation of its two images (Cannelle 2013). The match filter
 // (match_filter.h) judges a match by them.
 //
 // The rays are C_a + s v_a and C_b + t v_b. With D = C_b - C_a and c = v_a' v_b:

@@ -1,4 +1,4 @@
-// Straight edges in an image, with the covariance of their lines (Kalantari 2009, chapter 2).
+// Finds straight edges in an image, with the covariance of their lines (Kalantari 2009, chapter 2).
 //
 // OpenCV's line segment detector finds the edges (R. Grompone von Gioi, J. Jakubowicz, J.-M. Morel and G. Randall,
 // "LSD: a fast line segment detector with a false detection control", IEEE PAMI 32(4), 2010). It does not say how

@@ -1,4 +1,5 @@
-// Exact nearest neighbours between the SIFT descriptors of two images, from a to b and from b to a in one pass.
+// Finds the exact nearest neighbours between the SIFT descriptors of two images, from a to b and from b to a in one
+// pass.
 #pragma once
 
 #include <cstdint>

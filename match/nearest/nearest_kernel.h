@@ -1,5 +1,5 @@
-// The inner loops of nearest_neighbours. Internal to match/. They work on raw pointers, so that each kernel can be
-// compiled for its own processor.
+// Declares the inner loops of nearest_neighbours. Internal to match/. They work on raw pointers, so that each kernel
+// can be compiled for its own processor.
 //
 // |a - b|^2 = |a|^2 + |b|^2 - 2 a.b, so the distances are a matrix product of bytes. It is computed in tiles of a few
 // rows and 16 or 32 columns. A tile stays in registers, and its distances go straight into the lists of nearest

@@ -1,6 +1,6 @@
-// Matching of two images whose relative orientation is trusted. A feature is compared only with features near its
-// epipolar line, between the smallest and the largest object distance. The ratio test then sees only rivals that the
-// geometry allows: the next window of a repeated facade no longer makes the right match ambiguous.
+// Matches two images whose relative orientation is trusted. A feature is compared only with features near its epipolar
+// line, between the smallest and the largest object distance. The ratio test then sees only rivals that the geometry
+// allows: the next window of a repeated facade no longer makes the right match ambiguous.
 #pragma once
 
 #include <cstdint>

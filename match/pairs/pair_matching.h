@@ -1,4 +1,4 @@
-// Matching of two images: k-best mutual nearest neighbours (Cannelle 2013), verified by two-view geometry.
+// Matches two images by k-best mutual nearest neighbours (Cannelle 2013), verified by two-view geometry.
 #pragma once
 
 #include <cstdint>

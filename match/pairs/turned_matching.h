@@ -1,5 +1,5 @@
-// Faster matching of two vertical images: everything on the ground is turned by the same angle from one image to the
-// other.
+// Matches two vertical images faster, because everything on the ground is turned by the same angle from one image to
+// the other.
 //
 // Vertical images do not show the vertical (upright_matching.h). But the coarsest features, matched first, tell the
 // turn of the pair. Directions of keypoints counted from it are then compared in sectors, which leaves a quarter of the

@@ -1,4 +1,5 @@
-// Faster matching of two images with known vertical: an object that is upright in one image is upright in the other.
+// Matches two images with known vertical faster, because an object that is upright in one image is upright in the
+// other.
 //
 // The direction of a feature is counted from the vertical at its place in the image, in sectors of 30 degrees. Features
 // are compared only with those in the same and in the two adjacent sectors, which is a quarter of all comparisons

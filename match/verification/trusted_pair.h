@@ -1,6 +1,6 @@
-// The relative orientation of two images that is known before they are matched: within a frame from the mounts of the
-// rig, between nearby frames of one drive from the trajectory. A trajectory may be off by metres in the ground frame,
-// but it is accurate to centimetres from second to second.
+// Gives the relative orientation of two images that is known before they are matched: within a frame from the mounts of
+// the rig, between nearby frames of one drive from the trajectory. A trajectory may be off by metres in the ground
+// frame, but it is accurate to centimetres from second to second.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,6 @@
-// Relative orientation of two images from matches, many of which may be wrong: RANSAC (Kalantari 2009, chapters 7 and
-// 8), choice between rotation, plane and general scene, robust adjustment with covariance.
+// Finds the relative orientation of two images from matches, many of which may be wrong. RANSAC (Kalantari 2009,
+// chapters 7 and 8) comes first, then the choice between rotation, plane and general scene, and the robust adjustment
+// with covariance.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,5 @@
-// The graph of panoramas by CGAL's alpha shape. This is the only file that includes CGAL, which takes long to compile.
+// Builds the graph of panoramas by CGAL's alpha shape. This is the only file that includes CGAL, which takes long to
+// compile.
 //
 // CGAL's alpha value is the squared radius. Positions in one plane have no tetrahedra; so each height gets up to a
 // millimetre more, depending on the row, before heights are stretched.

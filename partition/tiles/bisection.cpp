@@ -1,5 +1,5 @@
-// Recursive bisection with METIS (G. Karypis and V. Kumar, "A fast and high quality multilevel scheme for partitioning
-// irregular graphs", SIAM J. Sci. Comput. 20(1), 1998). Every level divides a set of nodes in two with
+// Bisects the graph recursively with METIS (G. Karypis and V. Kumar, "A fast and high quality multilevel scheme for
+// partitioning irregular graphs", SIAM J. Sci. Comput. 20(1), 1998). Every level divides a set of nodes in two with
 // METIS_PartGraphRecursive and a fixed seed. The tree of these divisions is the elimination tree of merge/.
 //
 // A half may consist of several fragments, whereas a tile should be in one piece, so that it can be adjusted on its

@@ -1,4 +1,5 @@
-// Separators of a bisection: for every node of the tree, a set of frames without which its two halves have no links.
+// Finds the separators of a bisection: for every node of the tree, a set of frames without which its two halves have no
+// links.
 //
 // The tie points of the two halves can be distributed so that only these frames occur in points of both halves
 // (adjust/problem/owner.h); the elimination sends their unknowns up to the node. The smallest such set is a smallest

@@ -1,5 +1,5 @@
-// Viewing cones of images with known position and attitude. They tell whether two images can see the same objects
-// (Cannelle 2013).
+// Gives the viewing cones of images with known position and attitude. They tell whether two images can see the same
+// objects (Cannelle 2013).
 #pragma once
 
 #include <vector>

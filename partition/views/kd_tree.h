@@ -1,5 +1,5 @@
-// Nearest neighbours among points of the ground plane by a k-d tree (J. L. Bentley, Communications of the ACM 18(9),
-// 1975).
+// Finds nearest neighbours among points of the ground plane by a k-d tree (J. L. Bentley, Communications of the ACM
+// 18(9), 1975).
 #pragma once
 
 #include <Eigen/Core>
