@@ -1,4 +1,4 @@
-// The start, the rounds and the tests of panoramic.h; the conditions themselves are in panoramic_system.h.
+// Makes the start, the rounds and the tests of panoramic.h; the conditions themselves are in panoramic_system.h.
 //
 // The threshold. The length of a residual of two numbers has the median 1.1774 sigma. The residuals of an adjustment
 // with the redundancy share q = f / 2n are shorter by sqrt(q), so that sigma = median / (1.1774 sqrt(q)). Observations

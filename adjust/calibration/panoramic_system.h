@@ -1,4 +1,4 @@
-// The conditions of panoramic.h and their normal equations. Internal to adjust/calibration/.
+// Gives panoramic.h its conditions and their normal equations. Internal to adjust/calibration/.
 #pragma once
 
 #include <limits>

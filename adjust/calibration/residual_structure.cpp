@@ -1,5 +1,5 @@
-// Names: `of_means` is sum n_c |r_c|^2, `squares` the sum of all |r|^2, `scatter` the degrees of freedom 2 (n - C) of
-// the pooled variance, `degrees` 2C - p. Empty cells count neither as cells nor as freedom.
+// In this file `of_means` is sum n_c |r_c|^2, `squares` the sum of all |r|^2, `scatter` the degrees of freedom 2 (n -
+// C) of the pooled variance, `degrees` 2C - p. Empty cells count neither as cells nor as freedom.
 #include "adjust/calibration/residual_structure.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Which observations a calibration takes:
+// Chooses the observations that a calibration takes:
 //
 //     off-line   control points, no tie points: a surveyed target field
 //     on-line    tie points alone: a free network. The scale of the rig has no observation; the loose sigmas of the

@@ -1,7 +1,7 @@
-// Two checks by numbers without unit. A strip: with the centres on their principal axis at the abscissae a_i,
-// `off_line` is the largest distance from the axis and `uneven` the largest |(a_i - a_{i-1}) / spacing - 1|. A level
-// scene: the distances of the points from the plane of most points are divided into two groups with the least scatter
-// within them (N. Otsu, 1979). Their separation is the difference of the means over the rms of the two standard
+// Makes two checks by numbers without unit. For a strip, with the centres on their principal axis at the abscissae a_i,
+// `off_line` is the largest distance from the axis and `uneven` the largest |(a_i - a_{i-1}) / spacing - 1|. For a
+// level scene, the distances of the points from the plane of most points are divided into two groups with the least
+// scatter within them (N. Otsu, 1979). Their separation is the difference of the means over the rms of the two standard
 // deviations.
 #include "adjust/checks/sanity_checks.h"
 

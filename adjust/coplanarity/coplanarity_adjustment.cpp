@@ -1,5 +1,5 @@
-// The equations of coplanarity_adjustment.h in columns: angles of the cameras (3 each), then image coordinates of the
-// observations (2 each), without those that are held. A row is one pair of one point,
+// Solves the equations of coplanarity_adjustment.h. Their columns are angles of the cameras (3 each), then image
+// coordinates of the observations (2 each), without those that are held. A row is one pair of one point,
 //
 //     F = det(d_1 | d_2 | m),   m = C_2 - C_1,
 //

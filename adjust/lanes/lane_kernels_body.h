@@ -1,5 +1,6 @@
-// The code of the kernels, for vectors of any width. Internal to adjust/lanes/: each lane_kernels_*.cpp sets the width
-// and includes it. The formulas are those of linearise.h and of geometry/camera/models/brown.h, written out:
+// Defines the kernels for vectors of any width, so that all processors run one source. Internal to adjust/lanes/: each
+// lane_kernels_*.cpp sets the width and includes it. The formulas are those of linearise.h and of
+// geometry/camera/models/brown.h, written out:
 //
 //     u = X - C,   X_cam = R u - t,   (x, y) = (X_cam.x, X_cam.y) / depth,   r2 = x^2 + y^2,
 //     radial = 1 + k1 r2 + k2 r2^2 + k3 r2^3,   slope = d radial / d r2,

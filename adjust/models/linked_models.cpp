@@ -1,5 +1,5 @@
-// Closing triangles. For the links S_ab (b -> a), S_bc (c -> b) and S_ac (c -> a), errors as steps in the models b, c,
-// c respectively, the loop is
+// Judges links by closing triangles. For the links S_ab (b -> a), S_bc (c -> b) and S_ac (c -> a), errors as steps in
+// the models b, c, c respectively, the loop is
 //
 //     S_ac^-1 S_ab S_bc = E(T xi_ab + xi_bc - xi_ac),   T = step_through(S_bc),
 //

@@ -1,6 +1,6 @@
-// Elimination of the places. With J = by_model_step(z) the derivative of S^-1 X by the step of its model, z = S^-1 X,
-// the residual r of an entry changes by J xi + (R'/s) dX. The normal matrix of X is (sum 1 / (s sigma)^2) I, the
-// `weight` of its Mean, and the eliminated equations are
+// Eliminates the places from the normal equations. With J = by_model_step(z) the derivative of S^-1 X by the step of
+// its model, z = S^-1 X, the residual r of an entry changes by J xi + (R'/s) dX. The normal matrix of X is (sum 1 / (s
+// sigma)^2) I, the `weight` of its Mean, and the eliminated equations are
 //
 //     N_mm += w J'J,   N_mn -= B_m B_n' / weight,   B_m = w / s J'R',   w = 1 / sigma^2
 //

@@ -1,5 +1,5 @@
-// The elimination of a chain of n frames, in the notation of given_trajectories.h. With y_k the right side and x_k the
-// step of frame k (six numbers), frame k is eliminated when the equations of the frames before it have been added:
+// Eliminates a chain of n frames, in the notation of given_trajectories.h. With y_k the right side and x_k the step of
+// frame k (six numbers), frame k is eliminated when the equations of the frames before it have been added:
 //
 //     carried:     S_k and y_k                           (`normal`, `right`)
 //     eliminated:  s_k = S_k^-1 y_k,  B_k = S_k^-1 C_k   (`solved`, `by_next`)

@@ -1,4 +1,4 @@
-// The steps of run(), and what each of them leaves for the next one:
+// Orients the block in the steps of run(). Each leaves for the next one:
 //
 //     average()          rotations of the frames from those of the pairs; pairs that disagree are dropped
 //     first_centres()    directions and lengths of the baselines, and centres from them, up to a similarity

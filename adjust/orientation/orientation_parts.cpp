@@ -1,8 +1,8 @@
-// The cut. With d(f) the distance in links of frame f from a frame at the rim, the half of the frames with the smallest
-// d is one part and the rest the other. The rim is the frame farthest from an arbitrary one, so that for a long block
-// the cut goes across it. Both halves are cut again until they have at most `part_frames` frames. Every part then takes
-// in the frames that are linked to its core; neighbouring parts share these, and the similarity between two parts
-// follows from the poses that both have of them.
+// Cuts a long block into parts. With d(f) the distance in links of frame f from a frame at the rim, the half of the
+// frames with the smallest d is one part and the rest the other. The rim is the frame farthest from an arbitrary one,
+// so that for a long block the cut goes across it. Both halves are cut again until they have at most `part_frames`
+// frames. Every part then takes in the frames that are linked to its core; neighbouring parts share these, and the
+// similarity between two parts follows from the poses that both have of them.
 //
 // The parts are independent models: each has a position, an attitude and a scale of its own. adjust/models finds them.
 // A frame keeps the pose of the part whose core holds it, because it lies at the rim of all other parts, where poses

@@ -1,7 +1,7 @@
-// The test. The rotation vector e from one direction to another is at right angles to both. A small error dx of a
-// direction d turns it by d x dx, so that the covariance of e is [d]x C [d]x'. That matrix is singular along d; adding
-// d d' makes it regular and changes nothing, because e has no part along d. e' (..)^-1 e is then chi-square with two
-// degrees of freedom.
+// Tests the verticals. The rotation vector e from one direction to another is at right angles to both. A small error dx
+// of a direction d turns it by d x dx, so that the covariance of e is [d]x C [d]x'. That matrix is singular along d;
+// adding d d' makes it regular and changes nothing, because e has no part along d. e' (..)^-1 e is then chi-square with
+// two degrees of freedom.
 //
 // The comparison. All pairs of n verticals would be too many, and rotations far apart in the graph are hardly known.
 // Vicinity gives each node the 1st, 2nd, 3rd, 5th, 7th, 10th ... nearest node with a vertical, by the variance of the

@@ -1,4 +1,4 @@
-// The robust losses rho(s) of the squared norm s = |r|^2, in sigmas, with c the scale:
+// Evaluates the robust losses rho(s) of the squared norm s = |r|^2, in sigmas, with c the scale:
 //
 //     Huber          s up to c^2,   2 c sqrt(s) - c^2 beyond                    rho' = c / sqrt(s)
 //     Cauchy         c^2 log(1 + s / c^2)                                        rho' = 1 / (1 + s / c^2)

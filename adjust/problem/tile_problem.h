@@ -1,4 +1,4 @@
-// The observations and unknowns of one tile. They are the input of the tile bundle adjustment (adjust/), of the
+// Holds the observations and unknowns of one tile. They are the input of the tile bundle adjustment (adjust/), of the
 // condensed normal equations (merge/) and, with one tile for the whole block, of the monolithic reference.
 //
 // Residuals, each divided by its sigma (r is dimensionless; cost F = 1/2 sum rho(|r|^2)):

@@ -1,4 +1,4 @@
-// The normal equations. With A_i the derivative of a residual by its point, B_i that by the pose of its frame (6
+// Forms the normal equations. With A_i the derivative of a residual by its point, B_i that by the pose of its frame (6
 // numbers) and w_i its weight,
 //
 //     P = sum w A'A,   p = -sum w A'r,   K = sum w A'B (3 x 18)

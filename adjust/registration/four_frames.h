@@ -1,5 +1,5 @@
-// The normal equations of a 2x2 registration: the unknowns are the poses of four frames in the axes of the first one,
-// and the points.
+// Gives the normal equations of a 2x2 registration. The unknowns are the poses of four frames in the axes of the first
+// one, and the points.
 #pragma once
 
 #include <optional>

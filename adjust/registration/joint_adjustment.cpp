@@ -1,4 +1,4 @@
-// The residuals, each a vector with unit covariance where it is good. W is a whitening matrix, W'W = C^-1.
+// Adjusts these residuals, each a vector with unit covariance where it is good. W is a whitening matrix, W'W = C^-1.
 //
 //     link          W [Log(R_to R_from' R_m'),  R_from (C_to - C_from) - T]       (in_ground: C_to - C_from - T)
 //     resection     W [Log(R_0' R),  C - C_0]

@@ -1,5 +1,5 @@
-// The iteration of register_pair() in symbols. The thresholds are t_i = t_0 (t_n / t_0)^(i / m) for the first m = 3/4
-// of the iterations and t_n for the others, so that the last ones converge with a fixed test.
+// Registers a pair in iterations with falling thresholds. The thresholds are t_i = t_0 (t_n / t_0)^(i / m) for the
+// first m = 3/4 of the iterations and t_n for the others, so that the last ones converge with a fixed test.
 //
 // A robust start must resect the pair C, D from the points of A and B. These points are far away compared with the base
 // of A and B, and their errors along the rays are large. The resection weights every observation by the covariance of

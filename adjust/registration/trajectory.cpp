@@ -1,5 +1,5 @@
-// The chain. Successive frames i, j of a pass are linked by their stated relative pose (R_m, T), or, where there is
-// none, by the difference of their start poses:
+// Links the frames of each pass to a chain. Successive frames i, j of a pass are linked by their stated relative pose
+// (R_m, T), or, where there is none, by the difference of their start poses:
 //
 //     R_m = R_j R_i',   T = C_j - C_i  (in ground axes, in_ground)
 //

@@ -1,4 +1,4 @@
-// Whitening. The covariance of a residual is C = sigma^2 I + (J R) C_X (J R)', with its Cholesky factor
+// Whitens the residuals. The covariance of a residual is C = sigma^2 I + (J R) C_X (J R)', with its Cholesky factor
 //
 //     L = | a 0 |,   a = sqrt(C_00), b = C_10 / a, c = sqrt(C_11 - b^2),   L^-1 v = (v_0 / a, (v_1 - b v_0 / a) / c).
 //         | b c |

@@ -1,4 +1,4 @@
-// The attitudes of frames: r = Log(R R_0') / sigma, about the axes of the rig, radians.
+// Defines the terms for attitudes of frames: r = Log(R R_0') / sigma, about the axes of the rig, radians.
 //
 //   Log(R Exp(w) R_0') = Log(E Exp(R_0 w)),  E = R R_0':   by w: J_r^-1(Log E) R_0
 //

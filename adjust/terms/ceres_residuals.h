@@ -1,5 +1,5 @@
-// The residuals of a tile for Ceres' automatic differentiation. They are written from the definitions in tile_problem.h
-// alone, independently of linearise.cpp, so that each can be checked against the other.
+// Gives the residuals of a tile for Ceres' automatic differentiation. They are written from the definitions in
+// tile_problem.h alone, independently of linearise.cpp, so that each can be checked against the other.
 //
 // A frame or mount has a parameter block of 7 numbers (quaternion w, x, y, z, then centre), a camera as many as its
 // model has parameters (Intrinsics), and a point 3. PoseManifold gives a pose the tangent increment of this project

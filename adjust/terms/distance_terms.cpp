@@ -1,4 +1,5 @@
-// The known distances of two frames, scale bars: a rod between two cameras, or the length of a GNSS baseline.
+// Defines the terms for known distances of two frames, scale bars: a rod between two cameras, or the length of a GNSS
+// baseline.
 //
 //   r = (|b| - d) / sigma,   b = C_to - C_from,   metres between the origins of the frames' rigs;
 //   by d_to: b'/|b| / sigma,   by d_from: the negative of it,   by rotations: 0

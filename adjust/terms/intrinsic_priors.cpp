@@ -1,5 +1,5 @@
-// The priors of camera parameters: r = (k - k_0) / sigma for each parameter with a finite positive sigma, each
-// independent of the others.
+// Defines the terms for priors of camera parameters: r = (k - k_0) / sigma for each parameter with a finite positive
+// sigma, each independent of the others.
 //
 // The tile of the first oriented image of the camera owns them.
 #include "adjust/terms/automatic_terms.h"

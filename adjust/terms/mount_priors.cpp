@@ -1,4 +1,4 @@
-// The priors of mounts: r = Log(R R_0') / sigma (radians), (C - C_0) / sigma (metres, in the rig).
+// Defines the terms for priors of mounts: r = Log(R R_0') / sigma (radians), (C - C_0) / sigma (metres, in the rig).
 //
 // The tile of the first oriented image with the mount owns them. Their information about the scale is not given here:
 // it depends on the other mounts of the rig, so that the datum takes it from the rig (merge/datum,

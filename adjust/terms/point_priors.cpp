@@ -1,4 +1,5 @@
-// The given coordinates of control points: r = (X - X_0) / sigma, metres; an axis of infinite sigma is free.
+// Defines the terms for given coordinates of control points: r = (X - X_0) / sigma, metres; an axis of infinite sigma
+// is free.
 //
 // The tile of the point owns the prior, and eliminates it with the point (merge/tile/point_equations.h): normal
 // equations and datum take it from the point. The prior of a point that takes no part does not count.

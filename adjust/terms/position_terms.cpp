@@ -1,5 +1,5 @@
-// The positions of frames, as GNSS observes them: r = (C + R' l - P) / sigma, with l the lever arm in the axes of the
-// rig, metres.
+// Defines the terms for positions of frames, as GNSS observes them: r = (C + R' l - P) / sigma, with l the lever arm in
+// the axes of the rig, metres.
 //
 //   C + R' l:   by w: [R' l]x (as Exp(-w) R' l),   by d: I
 //

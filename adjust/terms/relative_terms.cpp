@@ -1,5 +1,5 @@
-// The relative poses of two frames: r = Log(R_to R_from' R_m') / sigma (radians), and (R_from (C_to - C_from) - T_m) /
-// sigma (metres, in the axes of the frame `from`).
+// Defines the terms for relative poses of two frames: r = Log(R_to R_from' R_m') / sigma (radians), and (R_from (C_to -
+// C_from) - T_m) / sigma (metres, in the axes of the frame `from`).
 //
 //   E = R_to R_from' R_m':   by w_to: J_r^-1(Log E) R_m R_from,   by w_from: the negative of it
 //

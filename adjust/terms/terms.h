@@ -1,4 +1,5 @@
-// The table of observation types. Every loop over the observations of a tile uses it, whatever their types are.
+// Declares the table of observation types. Every loop over the observations of a tile uses it, whatever their types
+// are.
 //
 // A row of a type (one position, one line ...) gives the unknowns that it touches, its residual r (divided by its
 // sigma, no unit) with derivatives by them, its robust loss, and its information about the datum. Costs, plans of

@@ -1,7 +1,7 @@
-// Poses in Ceres. A block is x = (q, C), the tangent increment (w, d) is that of pose_update: q Exp(w), C + d. The
-// Jacobian of Plus at 0 is the 7 x 6 matrix dq/dw = Q' / 4 above, with Q = quaternion_to_tangent(q), and the identity
-// below. Since dw/dq dq/dw = I, a cost function that knows its derivative J by (w, d) may hand Ceres J_w Q for the
-// quaternion: Ceres multiplies by dq/dw and gets J_w again. AnalyticImage does so.
+// Converts poses for Ceres. A block is x = (q, C), the tangent increment (w, d) is that of pose_update: q Exp(w), C +
+// d. The Jacobian of Plus at 0 is the 7 x 6 matrix dq/dw = Q' / 4 above, with Q = quaternion_to_tangent(q), and the
+// identity below. Since dw/dq dq/dw = I, a cost function that knows its derivative J by (w, d) may hand Ceres J_w Q for
+// the quaternion: Ceres multiplies by dq/dw and gets J_w again. AnalyticImage does so.
 #include "adjust/tile/ceres_problem.h"
 
 #include <ceres/cost_function.h>

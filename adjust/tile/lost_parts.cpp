@@ -1,6 +1,7 @@
-// The part as one rig. Let X = G(X_now) be the movement of the ground that puts a part where it belongs. A ray of the
-// part's frames, taken in the ground axes of the present poses, is a ray of a rig whose pose relative to the correct
-// ground is sought: X_now = R (X - C). Resection of this rig from the points of the standing frames gives (R, C), and
+// Resects a part as one rig. Let X = G(X_now) be the movement of the ground that puts a part where it belongs. A ray of
+// the part's frames, taken in the ground axes of the present poses, is a ray of a rig whose pose relative to the
+// correct ground is sought: X_now = R (X - C). Resection of this rig from the points of the standing frames gives (R,
+// C), and
 //
 //     X = R' X_now + C,   R_frame <- R_frame R,   C_frame <- R' C_frame + C
 //

@@ -1,4 +1,4 @@
-// The adjustment of one tile, in the order of run():
+// Adjusts one tile, in the order of run():
 //
 //     approach()   from start values to residuals of a few pixels, with a loss that forgets
 //     recover()    parts and frames that still stand apart are put back

@@ -1,5 +1,5 @@
-// The formulas of the three steps of baselines.h. For a common track with the rays a, b (unit, ground axes) and the
-// base t = C_b - C_a:
+// Computes the three steps of baselines.h by these formulas. For a common track with the rays a, b (unit, ground axes)
+// and the base t = C_b - C_a:
 //
 //     d_a a - d_b b = t,   n = a x b,   d_a = (t x b)'n / n'n,   d_b = (t x a)'n / n'n
 //     |t'n| / |t x a| = sine of the angle by which b misses the plane of t and a
