@@ -1,5 +1,5 @@
-// The verticals that the command `verticals` has found so far, in a file beside its table. A run after a kill, or one
-// with more images, reads only the images that are not in the file.
+// Keeps the verticals that the command `verticals` has found so far in a file beside its table. A run after a kill, or
+// one with more images, reads only the images that are not in the file.
 //
 // The file is a sealed text file (io/store/job/job_store.h). For each image it has a line "key found roll segments
 // length", and then its row of the table, of `length` bytes. The key is the hash of everything on which the row

@@ -1,4 +1,5 @@
-// The commands `resect` (poses of frames from control points) and `register` (registration of a trajectory).
+// Adds the commands `resect`, which gives poses of frames from control points, and `register`, which registers a
+// trajectory.
 #pragma once
 
 #include <functional>

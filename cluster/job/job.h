@@ -1,5 +1,5 @@
-// A run of a job, as every stage reads it: the store, the ranks, the options, the block. A stage writes what it makes
-// into the store, what it hands on into its results, and what happened into the record of the run (job_record.h).
+// Gives every stage the run of a job: the store, the ranks, the options, the block. A stage writes its files into the
+// store, the input of later stages into its results, and events into the record of the run (job_record.h).
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// What a run records of itself. Stages write it through run_stage() and its like (work_queue.h) and add_note()
-// (messages.h).
+// Holds the record of a run: events, stages, failures and notes. Stages write it through run_stage() and its like
+// (work_queue.h) and add_note() (messages.h).
 #pragma once
 
 #include <cstdint>

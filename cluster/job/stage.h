@@ -1,4 +1,4 @@
-// The table of the stages of a job: a row for each stage, in the order in which they run.
+// Declares the table of the stages of a job: a row for each stage, in the order in which they run.
 //
 // A row says what a stage needs and makes, what a unit of its work is, how it runs and what it reports. The pipeline,
 // the commands, the project file, the options, `status`, `check` and the folders of a job ask the table. The rows stand

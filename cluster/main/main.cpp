@@ -1,5 +1,4 @@
-// megablock: orients blocks of images, tile by tile, on any number of ranks.
-// Sample runs:
+// Runs the program megablock, which orients blocks of images, tile by tile, on any number of ranks. Sample runs:
 //   megablock init images -o block.yaml
 //   megablock run block.yaml -j job
 //   mpirun --bind-to none -n 2 megablock run block.yaml -j job

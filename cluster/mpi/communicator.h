@@ -1,4 +1,4 @@
-// The ranks of a run. Only this class calls MPI.
+// Connects the ranks of a run. Only this class calls MPI.
 //
 // Without mpirun there is one rank, and MPI is never initialised. Waiting ranks poll with short sleeps instead of
 // spinning, so that ranks that share a core do not hold up each other.

@@ -1,4 +1,5 @@
-// `megablock merge --monolithic`: compares a finished job with one monolithic adjustment of the same observations.
+// Runs `megablock merge --monolithic`, which compares a finished job with one monolithic adjustment of the same
+// observations.
 //
 // It reads poses, kept observations and priors of the job's result as one tile, and gives:
 //

@@ -1,4 +1,5 @@
-// The figures of a result for `status`. They are stored beside the result, because computing them reads all tracks.
+// Stores and reads the figures of a result for `status`. They are stored beside the result, because computing them
+// reads all tracks.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// The log of a job: a text file for each rank, <job>/log/<host>-<rank>.log.
+// Writes the log of a job: a text file for each rank, <job>/log/<host>-<rank>.log.
 //
 // The console shows a person how far the job is. The log tells afterwards what happened on each rank: when stages and
 // units began and ended, every warning of the console with its stage and unit, and every failure. A log that reaches

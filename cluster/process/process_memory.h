@@ -1,4 +1,4 @@
-// The memory of this process and of its host, and how much of it the process keeps.
+// Measures the memory of this process and of its host, and gives back what the process does not need.
 #pragma once
 
 #include <string>

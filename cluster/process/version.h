@@ -1,3 +1,4 @@
+// Gives the name and version of the program, which files, reports and --version state.
 #pragma once
 
 namespace megablock {

@@ -1,5 +1,5 @@
-// The results that the stages of a job give to later stages. The rows of the table of stages (cluster/job/stage.h) are
-// in stages.cpp.
+// Holds the results that the stages of a job give to later stages. The rows of the table of stages
+// (cluster/job/stage.h) are in stages.cpp.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// The reference for the merge: adjusts the whole block as one system, from one Ceres problem with automatic
-// derivatives. It uses none of the linearisation and elimination code of this room, so that the agreement of the two is
+// Adjusts the whole block as one system, from one Ceres problem with automatic derivatives, as the reference for the
+// merge. It uses none of the linearisation and elimination code of this room, so that the agreement of the two is
 // evidence.
 //
 // At a state with the residuals r and the Jacobian J of all observations, the undamped Newton step of the whole block

@@ -1,4 +1,4 @@
-// The seam check tests whether two halves of the block agree about the unknowns that they share.
+// Tests whether two halves of the block agree about the unknowns that they share.
 //
 // For the condensed normal equations q_a, q_b of two children, at a common linearisation point and with lambda = 0,
 //

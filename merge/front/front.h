@@ -1,4 +1,5 @@
-// Dense fronts: one step of the elimination, the same for the cells of a tile and for the nodes of the merge tree.
+// Factorises dense fronts: one step of the elimination, the same for the cells of a tile and for the nodes of the merge
+// tree.
 //
 // A front holds the normal equations K x = b of the unknowns E, which are eliminated here, and of the separator P,
 // whose equations go to the parent. It stands for the quadratic form of the residuals below its node,

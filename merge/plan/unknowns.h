@@ -1,5 +1,5 @@
-// The unknowns of the reduced normal equations: frames, free cameras, free mounts. Points never appear here, because
-// they are eliminated one by one inside their tile.
+// Names the unknowns of the reduced normal equations: frames, free cameras, free mounts. Points never appear here,
+// because they are eliminated one by one inside their tile.
 #pragma once
 
 #include <compare>

@@ -1,5 +1,5 @@
-// An ascending list of rows of a table, stored as the distances between neighbours, one byte each. A distance of 255
-// and more takes further bytes; this is rare where some dozen lists share the rows of a table.
+// Stores an ascending list of rows of a table as the distances between neighbours, one byte each. A distance of 255 and
+// more takes further bytes; this is rare where some dozen lists share the rows of a table.
 //
 // The lists save memory: each tile's plan has one for every cell, and for a million images these lists of points would
 // take 80 MiB as 32-bit numbers. A list is read from its beginning only, which is all that sweeps do.

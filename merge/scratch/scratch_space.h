@@ -1,5 +1,5 @@
-// The scratch directory of a rank and its budget. Tiles, their plans, factors and records of sweeps share the budget,
-// which bounds the bytes of all files in the directory at any time.
+// Manages the scratch directory of a rank and its budget. Tiles, their plans, factors and records of sweeps share the
+// budget, which bounds the bytes of all files in the directory at any time.
 //
 // The same files are written again and again with nearly the same length, and to get new pages and blocks from the
 // system costs more than the copy. A file that is not needed any more therefore stays as a spare one until others need

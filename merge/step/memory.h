@@ -1,5 +1,5 @@
-// The memory budgets of a rank, and its store of factors between the sweep up and the sweep down. tile_store.h holds
-// the tiles.
+// Gives the memory budgets of a rank, and stores its factors between the sweep up and the sweep down. tile_store.h
+// holds the tiles.
 //
 // Factors stay in memory within a budget of bytes. Beyond it they go to the scratch directory of the rank, as long as
 // that has room (scratch_space.h). Without room there they are dropped and computed again in the sweep down. The choice

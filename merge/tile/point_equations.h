@@ -1,4 +1,4 @@
-// One point's part of the normal equations. Condensation, back-substitution and covariances use it. Each of them
+// Forms one point's part of the normal equations. Condensation, back-substitution and covariances use it. Each of them
 // linearises the observations again, because that is cheaper than storing the linearisation.
 //
 // Residuals r are those of an image observation divided by its sigma (no unit), and J are their derivatives; both carry

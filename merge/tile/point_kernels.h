@@ -1,4 +1,4 @@
-// The loops over lanes of point_equations.h, on raw pointers. Lanes hold observations
+// Declares the loops over lanes of point_equations.h, on raw pointers. Lanes hold observations
 // (adjust/lanes/observation_lanes.h), the observations of a point in one frame (`sight`), or points. Symmetric 3 x 3
 // matrices are stored by the rows of their lower triangle (6 values), and triangular ones in the same way.
 //

@@ -1,5 +1,6 @@
-// The code of the kernels in point_kernels.h, for vectors of any width. Internal to merge/tile/: each
-// point_kernels_*.cpp sets the width and includes it. The formulas are in point_equations.h and cell_assembler.h.
+// Defines the kernels of point_kernels.h for vectors of any width, so that all processors run one source. Internal to
+// merge/tile/: each point_kernels_*.cpp sets the width and includes it. The formulas are in point_equations.h and
+// cell_assembler.h.
 //
 // A kernel works on kWidth lanes at a time. Counts are multiples of eight, the largest width, so that no kernel has a
 // loop for a remainder; the lanes behind the last one hold values that do no harm. The elements of a vector are one

@@ -1,5 +1,5 @@
-// The cost of a point X at held poses, with its residuals r_k and their derivatives J_k by X (prior included, without a
-// loss), s = |r_k|^2:
+// Minimises the cost of a point X at held poses, with its residuals r_k and their derivatives J_k by X (prior included,
+// without a loss), s = |r_k|^2:
 //
 //     f(X) = 1/2 sum rho(s),   b = -f' = -sum rho' J'r,   f'' ~ sum rho' J'J + 2 rho'' (J'r)(J'r)'
 //

@@ -1,4 +1,4 @@
-// The sweep down: computes the step of every unknown, and the trial state after the step.
+// Sweeps down the tree: computes the step of every unknown, and the trial state after the step.
 //
 // It has two parts. The first goes down the tree with the factors alone, down to the unknowns of all tiles, and reads
 // no observations. The motion of the whole block (block_motion.h) needs the steps of all frames, so that the ranks meet

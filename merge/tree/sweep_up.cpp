@@ -1,4 +1,4 @@
-// The sweep up: condenses tiles and eliminates fronts, children before parents.
+// Sweeps up the tree: condenses tiles and eliminates fronts, children before parents.
 //
 // Nodes are numbered depth first, so that a front is eliminated as soon as both of its children are there. Few updates
 // then wait at a time: those of the left siblings along one path to the root. Tiles take most of the time and are

@@ -1,5 +1,6 @@
-// The messages between ranks that the runner of the merge tree needs. It is an interface, because merge/ does not know
-// MPI: the communicator of cluster/mpi/communicator.h sends messages between ranks, and OneProcess is for one process.
+// Declares the messages between ranks that the runner of the merge tree needs. It is an interface, because merge/ does
+// not know MPI: the communicator of cluster/mpi/communicator.h sends messages between ranks, and OneProcess is for one
+// process.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Names of the units of all stages.
+// Names the units of all stages.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The stage of the merge: adjusts all tiles together, exactly, and makes the result of the job.
+// Runs the stage of the merge, which adjusts all tiles together, exactly, and makes the result of the job.
 #pragma once
 
 #include <string>

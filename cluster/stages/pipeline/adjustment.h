@@ -1,4 +1,4 @@
-// The stage of adjustment. It makes adjust/<tile>.h5, the adjustment of each tile on its own.
+// Runs the stage of adjustment. It makes adjust/<tile>.h5, the adjustment of each tile on its own.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// The stage of candidate pairs. It makes graph.h5.
+// Runs the stage of candidate pairs. It makes graph.h5.
 #pragma once
 
 #include "cluster/job/job.h"

@@ -1,6 +1,6 @@
-// The stage of coverage: coverage/<tile>.txt, how the tie points of a tile cover its images, and result/coverage.csv,
-// the sum for every image of the block. An image whose tie points lie in one corner is badly determined; the table
-// names it before anything is adjusted.
+// Runs the stage of coverage. It makes coverage/<tile>.txt, the cover of each image of a tile by its tie points, and
+// result/coverage.csv, the sum for every image of the block. An image whose tie points lie in one corner is badly
+// determined; the table names it before anything is adjusted.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The stage of features. It makes features/<shard>.h5, keypoints and descriptors of 64 images each.
+// Runs the stage of features. It makes features/<shard>.h5, keypoints and descriptors of 64 images each.
 #pragma once
 
 #include <cstdint>

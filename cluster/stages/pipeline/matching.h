@@ -1,4 +1,4 @@
-// The stage of matching. It makes matches/<cell>.h5, the verified matches of the pairs of a cell.
+// Runs the stage of matching. It makes matches/<cell>.h5, the verified matches of the pairs of a cell.
 #pragma once
 
 #include <string>

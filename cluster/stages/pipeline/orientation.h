@@ -1,4 +1,4 @@
-// The stage of orientation. It makes orient/<generation>.h5, initial poses of all frames.
+// Runs the stage of orientation. It makes orient/<generation>.h5, initial poses of all frames.
 #pragma once
 
 #include <map>

@@ -1,4 +1,4 @@
-// The stage of tiles. It makes tiles.h5, the tiles of the block and the merge tree.
+// Runs the stage of tiles. It makes tiles.h5, the tiles of the block and the merge tree.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// The stage of tracks. It makes tracks/<tile>.h5, the tie points that each tile owns.
+// Runs the stage of tracks. It makes tracks/<tile>.h5, the tie points that each tile owns.
 #pragma once
 
 #include <string>
