@@ -1,4 +1,4 @@
-// A resection with a RANSAC of one's own around a minimal solver of the library.
+// Resects a camera with a RANSAC that the user writes around a minimal solver of the library.
 //
 // The pose of a camera follows from three points that are known in the ground frame (geometry/resection/p3p.h). Here a
 // camera sees 200 points, but four in ten are matched to the wrong place. The loop draws three matches at a time,

@@ -1,5 +1,5 @@
-// An open file of the operating system, with complete reads and writes on it. It is used where std::fstream says too
-// little about errors, or cannot flush to the disk.
+// Holds an open file of the operating system, and reads and writes it completely. It is used where std::fstream says
+// too little about errors, or cannot flush to the disk.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// Union-find over the numbers 0 to count - 1. The representative of a set is its lowest member, so the result does not
-// depend on the order of the unions.
+// Unites and finds disjoint sets of the numbers 0 to count - 1 (union-find). The representative of a set is its lowest
+// member, so the result does not depend on the order of the unions.
 #pragma once
 
 #include <algorithm>

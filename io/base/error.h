@@ -1,5 +1,5 @@
-// The exceptions of the project. A message is one line that lets the user act: it tells the fault, its place and the
-// remedy. cluster/ turns the exceptions into exit codes in one place.
+// Declares the exceptions of the project. A message is one line that lets the user act: it tells the fault, its place
+// and the remedy. cluster/ turns the exceptions into exit codes in one place.
 #pragma once
 
 #include <stdexcept>

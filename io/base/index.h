@@ -1,4 +1,4 @@
-// A separate index type for each kind of object, so that the compiler refuses to mix them up.
+// Gives each kind of object an index type of its own, so that the compiler refuses to mix them up.
 //
 // GlobalIndex<Kind> is a dense 64-bit index in the block, LocalIndex<Kind> a dense 32-bit index in a tile. Names that
 // users see are strings; they never serve as keys inside the program.

@@ -1,5 +1,5 @@
-// The block: cameras, rigs, frames, images, priors and control, as read from the project file and the image headers.
-// Results (poses, points) are kept separately, in BlockState.
+// Holds the block: cameras, rigs, frames, images, priors and control, as read from the project file and the image
+// headers. Results (poses, points) are kept separately, in BlockState.
 //
 // docs/developer/mathematics.md, "Conventions", defines the frames and the sense of rotations.
 #pragma once

@@ -1,5 +1,5 @@
-// The calibration of a rig: the result of `megablock calibrate`, and the file with which a project adopts it
-// (`calibration:` in the project file).
+// Holds the calibration of a rig, the result of `megablock calibrate`, and writes its file, which a project adopts with
+// `calibration:`.
 //
 // The file is YAML. Cameras are written as in a project file, mounts as in OpenSfM's rig_cameras.json:
 // X_cam = R X_rig + t, with R as a rotation vector in radians and t in metres. Posterior standard deviations are added.

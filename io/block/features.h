@@ -1,4 +1,4 @@
-// The features of an image and the matches of a pair of images, as match/ makes them and the store keeps them.
+// Holds the features of an image and the matches of a pair of images, as match/ makes them and the store keeps them.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// The table of observation types whose rows are one number between two frames, with its sigma.
+// Declares the table of observation types whose rows are one number between two frames, with its sigma.
 //
 // A row here is all that the project file, the block's file and its checks, appending, tiles and fingerprints need to
 // know of such a type. Its residual is in adjust/terms/, and asks for its numbers by the key.

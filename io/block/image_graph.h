@@ -1,4 +1,4 @@
-// Graphs of images and frames, and the results of partition/: cells of pairs, tiles, merge tree.
+// Holds graphs of images and frames, and the results of partition/: cells of pairs, tiles, merge tree.
 #pragma once
 
 #include <cstdint>

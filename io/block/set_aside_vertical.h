@@ -1,4 +1,4 @@
-// Observed verticals that the orientation rejects, with the reason.
+// Holds the observed verticals that the orientation rejects, with the reason.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Tracks (tie points) and their observations, as compressed sparse rows.
+// Holds tracks (tie points) and their observations, as compressed sparse rows.
 //
 // Positions are integers in units of 2^-10 px, which a double represents exactly. Files and all calculations use the
 // same values. Rounding moves a coordinate by at most 2^-11 px = 0.0005 px; the range is +-2^21 px.

@@ -1,4 +1,4 @@
-// Statistics of the number of interest points in the images of each camera.
+// Gives statistics of the number of interest points in the images of each camera.
 #pragma once
 
 #include "io/result/result.h"

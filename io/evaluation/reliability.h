@@ -1,6 +1,6 @@
-// Reliability of single observations: how large a gross error must be to be detected, and how much an undetected error
-// can change the result (Baarda 1968, "A testing procedure for use in geodetic networks"; Pope 1976, "The statistics of
-// residuals and the detection of outliers").
+// Gives the reliability of single observations: how large a gross error must be to be detected, and how much an
+// undetected error can change the result (Baarda 1968, "A testing procedure for use in geodetic networks"; Pope 1976,
+// "The statistics of residuals and the detection of outliers").
 //
 // Everything follows from the redundancy number r of the observation (observation_statistics.h), 0 <= r <= 1. It is the
 // share of an error that appears in the observation's own residual. `sigma` is the sigma of the observation in the

@@ -1,5 +1,5 @@
-// Remarks about weaknesses of a result that its reader must not overlook. The terminal and the report print the same
-// texts, which are therefore plain text without markup. The seam check and the notes of a run have lines of their own
+// Lists the weaknesses of a result that its reader must not overlook. The terminal and the report print the same texts,
+// which are therefore plain text without markup. The seam check and the notes of a run have lines of their own
 // (merge/checks/seam_check.h, cluster/job/messages.h).
 #pragma once
 

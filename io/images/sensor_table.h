@@ -1,4 +1,4 @@
-// Sensor widths of well-known cameras. They turn a focal length in millimetres into one in pixels.
+// Looks up the sensor widths of well-known cameras. They turn a focal length in millimetres into one in pixels.
 //
 // The table (sensor_widths.csv, about 3 800 cameras) joins makers' data sheets with the public table of COLMAP; its
 // head states the sources and licences, and make_sensor_widths.py makes it. Programs write the same camera with other

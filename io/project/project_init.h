@@ -1,4 +1,4 @@
-// `megablock init`: writes a project file for a folder of images.
+// Writes a project file for a folder of images (`megablock init`).
 #pragma once
 
 #include <string>

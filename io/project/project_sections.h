@@ -1,4 +1,4 @@
-// Readers of those sections of the project file that change the block. Internal to io/ (project.cpp).
+// Reads those sections of the project file that change the block. Internal to io/ (project.cpp).
 #pragma once
 
 #include "io/project/image_scan.h"

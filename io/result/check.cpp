@@ -1,6 +1,6 @@
-// Three kinds of test, from the cheap to the thorough: the seal of a unit fits its bytes (JobStore::verified_path), its
-// contents have their format (the reader of its kind), and units fit each other (digest, index, tiles). An error in one
-// file does not end the check, so that one run lists everything that is damaged.
+// Makes three kinds of test, from the cheap to the thorough: the seal of a unit fits its bytes
+// (JobStore::verified_path), its contents have their format (the reader of its kind), and units fit each other (digest,
+// index, tiles). An error in one file does not end the check, so that one run lists everything that is damaged.
 #include "io/result/check.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// The names in the index by image, which its writer and its readers share. Internal to io/.
+// Gives the names in the index by image, which its writer and its readers share. Internal to io/.
 //
 // measurements.h5 is a sparse matrix of images and tiles in compressed rows: image i has observations in the tiles
 // images/tile[begin[i]] to images/tile[begin[i + 1] - 1]. It also stores the fingerprints of the track files of which

@@ -1,6 +1,6 @@
-// The measurement store: finds the tie point observations of images, or those near a place on the ground. Only the
-// necessary parts of the job's files are read, so a query takes hardly longer in a large block
-// (docs/reference/file-formats.md, "Measurements").
+// Finds the tie point observations of images, or those near a place on the ground. Only the necessary parts of the
+// job's files are read, so a query takes hardly longer in a large block (docs/reference/file-formats.md,
+// "Measurements").
 //
 // For images, `measurements.h5` lists the tiles with observations in each image; the column of images in the track file
 // of a tile then gives the rows. For places, `points/district` and `points/box` of the result bound the adjusted

@@ -1,4 +1,5 @@
-// The result of a job, in one file (result/block.h5). Exports, the report and `evaluate` read only this file.
+// Writes and reads the result of a job, in one file (result/block.h5). Exports, the report and `evaluate` read only
+// this file.
 //
 // Covariances are those of the increments by which the adjustment moves the unknowns: a rotation R becomes R Exp(w), a
 // centre C becomes C + d, with (w, d) in this order. For a frame w is about the axes of the ground, for a mount about

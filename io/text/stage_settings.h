@@ -1,4 +1,4 @@
-// The options of the stages as written in the project file, before the stages read them.
+// Holds the options of the stages as written in the project file, before the stages read them.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Buffered output of text and binary numbers. A single check at the end reports every failure. Internal to io/.
+// Writes text and binary numbers through a buffer. A single check at the end reports every failure. Internal to io/.
 #pragma once
 
 #include <fmt/core.h>

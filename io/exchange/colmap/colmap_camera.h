@@ -1,4 +1,4 @@
-// Cameras as COLMAP's files hold them, translated by the table of camera models. Internal to io/.
+// Translates the cameras of COLMAP's files by the table of camera models. Internal to io/.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// The common result of all importers: the block that a reader of a foreign format returns.
+// Holds the common result of all importers: the block that a reader of a foreign format returns.
 #pragma once
 
 #include <vector>

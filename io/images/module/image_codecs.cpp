@@ -1,4 +1,4 @@
-// The only source of libmegablock_image_codecs.so, which gives io/images/image_codec.h the codecs of OpenCV. It is a
+// Gives io/images/image_codec.h the codecs of OpenCV, as the only source of libmegablock_image_codecs.so, which is a
 // library of its own for the reasons stated there.
 #include <opencv2/imgcodecs.hpp>
 

@@ -1,4 +1,4 @@
-// The plan view that the maps of the report share: its extent, its scale, and the places of frames in it.
+// Gives the plan view that the maps of the report share: its extent, its scale, and the places of frames in it.
 //
 // The drawing is a parallel projection along the vertical. With the middle (E0, N0) of the extent, the scale s and the
 // drawing of W = kMapWidth times H = `height` units,

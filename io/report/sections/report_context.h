@@ -1,4 +1,4 @@
-// The inputs of the report that are not part of the result.
+// Holds the inputs of the report that are not part of the result.
 #pragma once
 
 #include <functional>

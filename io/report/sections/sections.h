@@ -1,4 +1,4 @@
-// The sections of the report, in the order of the page. A section without contents is an empty text.
+// Writes the sections of the report, in the order of the page. A section without contents is an empty text.
 //
 // The figures were gathered before (io/evaluation/figures.h), so only the maps read tracks, and only a sample of them.
 #pragma once

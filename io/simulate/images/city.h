@@ -1,4 +1,5 @@
-// The surfaces of the rendered scenes (terrain with boxes on it), their intersections with rays, and their colours.
+// Gives the surfaces of the rendered scenes (terrain with boxes on it), their intersections with rays, and their
+// colours.
 #pragma once
 
 #include "io/simulate/images/texture.h"

@@ -1,4 +1,5 @@
-// Random numbers with the same bits on every machine; those of the standard library differ between implementations.
+// Draws random numbers with the same bits on every machine; those of the standard library differ between
+// implementations.
 //
 // The generator is SplitMix64 (Steele, Lea, Flood 2014). Seed and stream select a generator, so every frame can draw
 // from its own stream, and no result depends on the order in which frames are processed.

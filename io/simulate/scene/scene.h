@@ -1,5 +1,5 @@
-// The common parts of all simulated scenes: the frames of a block, the surfaces that they see, and the functions that
-// simulate observations.
+// Gives the common parts of all simulated scenes: the frames of a block, the surfaces that they see, and the functions
+// that simulate observations.
 //
 // Coordinates: the ground frame is x east, y north, z up, in metres. A rig and a camera have x right, y down, z ahead.
 // A pose has the rotation R ground -> rig and the centre C in the ground, so that a point X has the rig coordinates R

@@ -1,4 +1,4 @@
-// A simulated block together with its truth.
+// Holds a simulated block together with its truth.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The options of the simulator: the scene, the observations, and their errors.
+// Holds the options of the simulator: the scene, the observations, and their errors.
 //
 // The noise of priors and of control points is normal and independent per axis, and its sigma is the one that the block
 // states. Weighted residuals of the truth therefore have the variance 1. Only the trajectory of Stereopolis breaks this

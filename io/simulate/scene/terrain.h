@@ -1,4 +1,4 @@
-// Smooth terrain for simulated blocks: a sum of four plane waves.
+// Gives smooth terrain for simulated blocks, a sum of four plane waves.
 //
 //     z(x, y) = sum of a_i sin(w_i . (x, y) + phase_i),  |w_i| = 2 pi / (l_i scale),  l = 6, 4, 2.5, 1.5,
 //     a = relief / 2 times 0.4, 0.3, 0.2, 0.1; the directions of w_i and the phases are random.

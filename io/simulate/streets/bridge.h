@@ -1,4 +1,4 @@
-// A bridge with ramps, on which one street crosses another.
+// Models a bridge with ramps, on which one street crosses another.
 //
 // The street along x through y = centre.y is raised between its neighbouring crossings. It is flat over the street
 // along y and descends to the ground on both sides as a raised cosine. Walls stand on both sides; beside the opening

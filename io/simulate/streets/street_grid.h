@@ -1,4 +1,4 @@
-// The plan of the street scene, which drives, tie points and rendered houses share.
+// Gives the plan of the street scene, which drives, tie points and rendered houses share.
 //
 // The axes of the streets are x = i S and y = j S for all integers i, j, where S is the spacing. Houses stand on the
 // ground between them, up to about kFacade metres from the axes.

@@ -1,4 +1,4 @@
-// The surfaces of the street scene: roads and facades (street_grid.h).
+// Gives the surfaces of the street scene: roads and facades (street_grid.h).
 //
 // Seen from a street, the scene is a channel: the road z = ground(x, y) up to the facades, and vertical facades up to
 // 12 m. A line of sight that leaves the streets in plan is blocked by houses, whatever their height.

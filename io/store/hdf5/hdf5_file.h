@@ -1,4 +1,4 @@
-// Writer and reader of HDF5 files. All files that the project stores go through these two classes.
+// Writes and reads HDF5 files. All files that the project stores go through these two classes.
 //
 // Files are written with libver 'latest', without time stamps, and in a fixed order of calls; equal contents give equal
 // bytes. The content hash of a unit therefore stands for its contents (job_store.h). A file has one writer. HDF5's own

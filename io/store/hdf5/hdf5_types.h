@@ -1,4 +1,4 @@
-// The common parts of the HDF5 reader and writer: types, errors, properties of files. Internal to io/store/hdf5/.
+// Gives the common parts of the HDF5 reader and writer: types, errors, properties of files. Internal to io/store/hdf5/.
 #pragma once
 
 #include <hdf5.h>

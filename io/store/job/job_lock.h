@@ -1,4 +1,4 @@
-// The lock of a job, which ensures that only one run at a time works on a job directory.
+// Locks a job, so that only one run at a time works on its directory.
 //
 // The lock is flock on an open file and not the existence of the file: the kernel releases it when the process ends,
 // even by kill -9, so that no killed run leaves a job locked. The text inside is for people and for messages; nothing

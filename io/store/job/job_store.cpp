@@ -1,4 +1,4 @@
-// The trailer of a sealed unit: 64 bytes, little-endian, after the payload.
+// Seals a unit by a trailer of 64 bytes, little-endian, after the payload:
 //
 //     0  magic "MBUNIT\r\n"      8  u32 format version     12  u32 zero
 //    16  u64 payload length     24  u64 XXH3 of payload    32  u64 fingerprint
