@@ -1,5 +1,5 @@
-// Polynomial ideals with finitely many solutions over a prime field (M15, M16). They test the closed-form solvers of
-// the program independently; the program does not contain them.
+// Computes with polynomial ideals of finitely many solutions over a prime field (M15, M16). They test the closed-form
+// solvers of the program independently; the program does not contain them.
 //
 // Plain linear algebra replaces Buchberger's pairs. V_d is the smallest space of polynomials of degree <= d that
 // contains the generators and, with every f of degree < d, also all x_i f. Its echelon form in degree reverse

@@ -1,4 +1,4 @@
-// Scenes of cameras whose positions are known (KP-18), their noise and the measures of their errors (KP-19).
+// Simulates scenes of cameras whose positions are known (KP-18), their noise and the measures of their errors (KP-19).
 //
 // Cameras in a box high above the origin, all aimed at it, gamma = 0; every camera sees every point. Satellite: 700 to
 // 800 km up, f = 1e6 px; drone: 50 to 75 m, f = 1e4 px. Image coordinates are pixels from the principal point.

@@ -1,4 +1,4 @@
-// A panoramic head for tests: ten cameras of 1920 x 1080, f = 1400 px, eight around the compass and two up.
+// Gives a panoramic head for tests: ten cameras of 1920 x 1080, f = 1400 px, eight around the compass and two up.
 #pragma once
 
 #include <numbers>

@@ -1,5 +1,5 @@
-// A small town for tests: passes of a vehicle over a grid of streets, a trajectory that drifts by metres on each pass,
-// relative poses of successive frames and registrations where passes meet.
+// Gives a small town for tests: passes of a vehicle over a grid of streets, a trajectory that drifts by metres on each
+// pass, relative poses of successive frames and registrations where passes meet.
 #pragma once
 
 #include "adjust/registration/four_frames.h"

@@ -1,4 +1,4 @@
-// One camera of every model, with strong distortion and 1920 x 1080 pixels.
+// Gives one camera of every model, with strong distortion and 1920 x 1080 pixels.
 #pragma once
 
 #include <cmath>

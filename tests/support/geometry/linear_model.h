@@ -1,5 +1,5 @@
-// The simplest estimator for ransac.h: N unknowns c of y = c.x, from samples of N observations. With it, tests concern
-// only the engine.
+// Gives the simplest estimator for ransac.h: N unknowns c of y = c.x, from samples of N observations. With it, tests
+// concern only the engine.
 #pragma once
 
 #include <Eigen/Dense>

@@ -1,4 +1,4 @@
-// Two images of a simulated scene for the solvers of relative orientation. The camera is that of the simulations of
+// Simulates two images of a scene for the solvers of relative orientation. The camera is that of the simulations of
 // Nister (2004) and Kalantari (2009), with 352 x 288 pixels and 45 degrees, with points at depths of 1 to 3 or in the
 // plane of depth 2; or that of an aerial block.
 #pragma once

@@ -1,5 +1,5 @@
-// Segments of parallel edges, and clutter, in a simulated image with 3008 x 2000 pixels and a focal length of 3000
-// pixels.
+// Simulates segments of parallel edges, and clutter, in a simulated image with 3008 x 2000 pixels and a focal length of
+// 3000 pixels.
 #pragma once
 
 #include <Eigen/Geometry>

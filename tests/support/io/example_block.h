@@ -1,4 +1,4 @@
-// Small blocks that use every field, for tests of files.
+// Gives small blocks that use every field, for tests of files.
 #pragma once
 
 #include <string>

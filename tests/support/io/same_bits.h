@@ -1,4 +1,4 @@
-// Equality of bits, so that NaN equals NaN and -0 differs from 0.
+// Compares values bit by bit, so that NaN equals NaN and -0 differs from 0.
 #pragma once
 
 #include <cstring>

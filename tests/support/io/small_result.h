@@ -1,4 +1,4 @@
-// A small result with everything that the exporters must tell apart: a rig of two cameras, a camera with every
+// Gives a small result with everything that the exporters must tell apart: a rig of two cameras, a camera with every
 // distortion parameter, an image without orientation, points without position, rejected observations.
 #pragma once
 
