@@ -4,9 +4,9 @@
 // frames. Every part then takes in the frames that are linked to its core; neighbouring parts share these, and the
 // similarity between two parts follows from the poses that both have of them.
 //
-// The parts are independent models: each has a position, an attitude and a scale of its own. adjust/models finds them.
-// A frame keeps the pose of the part whose core holds it, because it lies at the rim of all other parts, where poses
-// are worst.
+// The parts are independent models: each has a position, an attitude and a scale of its own. adjust/independent_models
+// finds them. A frame keeps the pose of the part whose core holds it, because it lies at the rim of all other parts,
+// where poses are worst.
 #include "adjust/orientation/orientation_parts.h"
 
 #include <fmt/core.h>
@@ -17,7 +17,7 @@
 #include <optional>
 #include <set>
 
-#include "adjust/models/model_assembly.h"
+#include "adjust/independent_models/model_assembly.h"
 #include "adjust/orientation/steps/ground_alignment.h"
 #include "adjust/orientation/steps/orientation_graph.h"
 #include "geometry/numbers/decompositions.h"

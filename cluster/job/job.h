@@ -43,7 +43,7 @@ struct Job {
   JobStore store;
   JobOptions settings;
   JobLog log;
-  const Block& block;                     // of a JobBlock
+  const Block& block;                     // of a JobBlock. Names may be absent; it is empty after the merge.
   const PagedTables& tables;              // of the same
   std::vector<std::int64_t> generations;  // image counts at which the block grew; the last is its size
 

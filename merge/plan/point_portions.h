@@ -1,6 +1,7 @@
 // Divides the points of a tile into portions of a few hundred, cell by cell, so that threads share even a tile of few
 // cells evenly. The portions depend on the plan alone. Sums over the points of a portion, added in the order of the
 // portions, therefore have the same bits for any number of threads.
+// Internal to merge/: it is not installed.
 #pragma once
 
 #include <algorithm>

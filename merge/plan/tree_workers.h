@@ -1,5 +1,6 @@
 // Visits the cells of a tile along their tree, on all threads of the process (geometry/threads/workers.h). A node is
 // visited after its children (elimination), or after its parent (covariances).
+// Internal to merge/: it is not installed.
 #pragma once
 
 #include <omp.h>

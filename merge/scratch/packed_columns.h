@@ -10,6 +10,7 @@
 //   others     unchanged: plain values, and positions of three doubles each
 //
 // The state of the file says whether everything was written, or read.
+// Internal to merge/: it is not installed.
 #pragma once
 
 #include <cstdint>

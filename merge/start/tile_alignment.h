@@ -11,6 +11,7 @@
 // rho is the Cauchy loss, because frames at the rim of a tile depend on few points. p and r are the medians of the
 // differences, updated in each of a few iterations. The last term keeps the block at the mean place of its tiles; a is
 // the first p, and the term acts on the shift of a tile and on the displacement by rotation and scale at its extent.
+// Internal to merge/: it is not installed.
 #pragma once
 
 #include <vector>

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "adjust/models/model_assembly.h"
+#include "adjust/independent_models/model_assembly.h"
 #include "io/base/error.h"
 
 namespace megablock {

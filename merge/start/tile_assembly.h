@@ -3,13 +3,14 @@
 //
 // Each tile was adjusted with the datum of its start values alone. Neighbours therefore differ in place, attitude and
 // scale by the errors of these values. The frames that tiles share give the similarities between the tiles
-// (adjust/models/model_assembly.h). Each connected part is then moved back to the mean place of its tiles. Its attitude
-// follows from the rotations R_t of the assembly,
+// (adjust/independent_models/model_assembly.h). Each connected part is then moved back to the mean place of its tiles.
+// Its attitude follows from the rotations R_t of the assembly,
 //
 //     R = mean R_t',     weighted by the frames of tile t,
 //
 // because projection centres on a line would leave it undetermined. Its size and place follow from the projection
 // centres.
+// Internal to merge/: it is not installed.
 #pragma once
 
 #include <vector>

@@ -170,7 +170,8 @@ class MergeTreeRunner : public TreeRunner {
   FactorStore factors_;                           // of this rank's nodes
   std::map<std::int64_t, UpdateMatrix> updates_;  // waiting for their parent on this rank
   SweepRecorder* recorder_ = nullptr;
-  std::vector<std::int64_t> left_;  // recorded subtrees of this sweep whose update has left this rank's own subtrees
+  std::vector<std::int64_t>
+      sent_subtrees_;  // recorded subtrees of this sweep whose update has left this rank's own subtrees
   BlockGauge gauge_;
   bool with_columns_ = false;  // the sweep has the further right-hand sides of a free datum
   bool check_seams_ = false;

@@ -133,7 +133,8 @@ bool MergeTreeRunner::update_leaves(std::int64_t node) const {
 std::vector<bool> MergeTreeRunner::resume(const SweepRecord& record) {
   factors_.adopt(record.factors);
   seams_ = record.seams;
-  std::ranges::copy_if(record.subtrees, std::back_inserter(left_), [&](std::int64_t n) { return update_leaves(n); });
+  std::ranges::copy_if(record.subtrees, std::back_inserter(sent_subtrees_),
+                       [&](std::int64_t n) { return update_leaves(n); });
   return nodes_of(record.subtrees);
 }
 
@@ -149,10 +150,10 @@ void MergeTreeRunner::record(std::int64_t node, const UpdateMatrix& update) {
   for (const auto& [n, waiting] : updates_)
     if (on_one_rank_[static_cast<std::size_t>(n)]) updates[n] = &waiting;
   if (!factors_.copy_to_scratch() || !recorder_->write_updates(updates)) return recorder_->give_up();
-  if (update_leaves(node)) left_.push_back(node);
+  if (update_leaves(node)) sent_subtrees_.push_back(node);
 
   SweepRecord record;
-  std::set<std::int64_t> subtrees(left_.begin(), left_.end());
+  std::set<std::int64_t> subtrees(sent_subtrees_.begin(), left_.end());
   for (const auto& [n, waiting] : updates) subtrees.insert(n);
   record.subtrees.assign(subtrees.begin(), subtrees.end());
   const std::vector<bool> done = nodes_of(record.subtrees);
@@ -210,7 +211,7 @@ UpReport MergeTreeRunner::condense_all(const Sweep& sweep) {
   updates_.clear();
   factors_.clear();
   seams_.clear();
-  left_.clear();
+  sent_subtrees_.clear();
   const SweepRecord before = recorder_ ? recorder_->begin({sweep, check_seams_, with_columns_}) : SweepRecord();
   const std::vector<bool> done = resume(before);
   std::vector<std::int64_t> leaves;

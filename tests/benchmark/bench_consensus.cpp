@@ -5,7 +5,7 @@
 //     bench_consensus
 #include <benchmark/benchmark.h>
 
-#include "adjust/models/model_link.h"
+#include "adjust/independent_models/model_link.h"
 #include "adjust/orientation/steps/resection.h"
 #include "adjust/resection/rig_resection.h"
 #include "cluster/job/work_queue.h"

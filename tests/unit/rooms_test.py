@@ -20,7 +20,7 @@ io/simulate/scene io/simulate/streets io/simulate/images io/simulate/blocks io/s
 io/report/drawing io/report/sections io/report
 partition/views partition/candidates partition/links partition/tiles partition/diagnostics
 match/images match/features match/nearest match/verification match/filter match/pairs match/tracks
-adjust/problem adjust/terms adjust/lanes adjust/resection adjust/tile adjust/models adjust/orientation/steps adjust/orientation
+adjust/problem adjust/terms adjust/lanes adjust/resection adjust/tile adjust/independent_models adjust/orientation/steps adjust/orientation
 adjust/calibration adjust/registration adjust/coplanarity adjust/checks
 merge/scratch merge/plan merge/front merge/tile merge/datum merge/step merge/checks merge/tree merge/start merge/rig
 cluster/process cluster/mpi cluster/job cluster/outcome

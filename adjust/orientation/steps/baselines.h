@@ -8,6 +8,7 @@
 //     baselines. The logarithms of the lengths follow from all ratios (L1). Motion along one line is no special case
 //     (Z. Cui and P. Tan, "Global structure-from-motion by similarity averaging", ICCV 2015).
 //  3. The centres from C_b - C_a = s t of all pairs and the known positions, by reweighted least squares.
+// Internal to adjust/: it is not installed.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,6 @@
 // Adjusts the oriented frames, points and cameras of the initial orientation together. It takes the residuals of a tile
 // (tile_problem.h) over the tracks of the graph and solves them with Ceres to a loose tolerance.
+// Internal to adjust/: it is not installed.
 #pragma once
 
 #include "adjust/orientation/steps/track_intersection.h"

@@ -8,6 +8,7 @@
 // weight, and a point behind its camera still has a gradient. The method is that of L. Pan, D. Barath, M. Pollefeys and
 // J. Schoenberger, "Global structure-from-motion revisited", ECCV 2024. They keep d as an unknown to start at random;
 // here baselines.h gives the start, and d is eliminated.
+// Internal to adjust/: it is not installed.
 #pragma once
 
 #include "adjust/orientation/steps/track_intersection.h"

@@ -1,5 +1,6 @@
 // Transforms the first rotations and centres from their arbitrary coordinate frame to the ground frame, or to the frame
 // of a free block.
+// Internal to adjust/: it is not installed.
 #pragma once
 
 #include "adjust/orientation/steps/track_intersection.h"

@@ -1,6 +1,7 @@
 // Gives initial orientation its input: the frames, images, relative orientations and tracks of one component, in local
 // numbers. Frames and images are ordered by name, tracks by length and then by their first observations, so that the
 // numbers do not depend on the order of the images in the block.
+// Internal to adjust/: it is not installed.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -12,6 +12,7 @@
 // those whose normals agree. Rotations alone do not tell. Those of twins differ by about n x m t, which adds up around
 // a triangle as the bases do, so that in narrow fields of view triangles of wrong twins close as well as those of
 // correct ones.
+// Internal to adjust/: it is not installed.
 #pragma once
 
 #include "adjust/orientation/steps/orientation_graph.h"

@@ -1,4 +1,5 @@
 // Gives the pose of one frame from its observations of intersected points.
+// Internal to adjust/: it is not installed.
 #pragma once
 
 #include "adjust/orientation/steps/track_intersection.h"

@@ -1,5 +1,6 @@
 // Intersects tracks at given poses, and finds their outliers. Up to 30 pairs of rays give a point each, and the point
 // with the smallest truncated sum of squares wins. Errors are angles between rays, so points need not be projected.
+// Internal to adjust/: it is not installed.
 #pragma once
 
 #include <Eigen/Core>

@@ -2,6 +2,7 @@
 // a position and kept observations are written. In these formats every image has its own camera.
 //
 // Throw InputError if a file cannot be written, and for fisheyes and panoramas (check_bal_model).
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <string>

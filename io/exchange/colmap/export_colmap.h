@@ -5,6 +5,7 @@
 // cy k1 k2 p1 p2), or as FULL_OPENCV with k4 to k6 = 0 if k3 is not zero; both are exactly our model. Ids are the
 // indices of the block + 1. Images of rigs are written as single cameras. Points are grey, and their error is the mean
 // length of their residuals in pixels.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <string>

@@ -1,4 +1,5 @@
 // Writes results for other programs: tables as CSV, points and projection centres as PLY, footprints as GeoJSON.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <string>

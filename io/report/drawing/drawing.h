@@ -3,6 +3,7 @@
 // Exaggeration: sigmas and residuals are far smaller than the things they belong to. They are drawn at the scale of the
 // map or sensor times a factor, which is 1, 2 or 5 times a power of ten so that readers can undo it; the caption states
 // it.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <string>

@@ -1,4 +1,5 @@
 // Formats text, numbers and tables for the HTML of the report.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <Eigen/Core>

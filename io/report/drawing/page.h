@@ -1,4 +1,5 @@
 // Puts the contents of the report into an HTML page with its styles and script.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <string>

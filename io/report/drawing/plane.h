@@ -7,6 +7,7 @@
 //
 // because the y axis of SVG points down. s is the largest scale at which the extent fits inside the margins; it is the
 // same for both axes, so that lengths and directions are right. H follows from the shape of the block, within limits.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <Eigen/Core>

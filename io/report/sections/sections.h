@@ -1,6 +1,7 @@
 // Writes the sections of the report, in the order of the page. A section without contents is an empty text.
 //
 // The figures were gathered before (io/evaluation/figures.h), so only the maps read tracks, and only a sample of them.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <functional>

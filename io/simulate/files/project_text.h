@@ -1,4 +1,5 @@
 // Writes the block.yaml of a simulated block, but does not overwrite one that the user has edited.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <string>

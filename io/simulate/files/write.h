@@ -2,6 +2,7 @@
 //
 // truth_tracks.h5 has the truth of tie_points.h5 row by row: the position of each track, and the Verdict of each
 // observation. The job never reads it.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <cstdint>

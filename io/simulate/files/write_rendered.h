@@ -1,4 +1,5 @@
 // Writes a simulated block as rendered images with the project files for them.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <string>

@@ -1,5 +1,6 @@
 // Gives the surfaces of the rendered scenes (terrain with boxes on it), their intersections with rays, and their
 // colours.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include "io/simulate/images/texture.h"

@@ -1,4 +1,5 @@
 // Writes a rendered image as a camera would write it: as JPEG with EXIF.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <opencv2/core.hpp>

@@ -2,6 +2,7 @@
 //
 // A pixel is the mean of 2 x 2 samples where they show several objects, and of two samples on the diagonal elsewhere.
 // Each sample is one ray, with the distortion of the true camera: X_ground = C + t R' (X/Z, Y/Z, 1).
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <opencv2/core.hpp>

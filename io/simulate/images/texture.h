@@ -3,6 +3,7 @@
 // The texture is a sum of octaves of value noise (random numbers on a lattice, smoothly interpolated) with waves from
 // three ground pixels up, each octave turned against the others, and of discs with random size and brightness. Octaves
 // that are finer than the footprint of the pixel fade out, so distant surfaces do not alias.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <Eigen/Core>

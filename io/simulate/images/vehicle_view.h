@@ -4,6 +4,7 @@
 //
 // The parts are boxes in axes of the rig, so that the view depends on the mount alone and is made once per camera. Only
 // the light changes: the six faces of a box have six brightnesses, which the pose of the rig decides.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <array>

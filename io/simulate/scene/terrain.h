@@ -4,6 +4,7 @@
 //     a = relief / 2 times 0.4, 0.3, 0.2, 0.1; the directions of w_i and the phases are random.
 //
 // A closed formula needs no grid, has no border, and is known at every place in constant time.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <array>

@@ -1,6 +1,7 @@
 // Simulates the measured trajectory of a vehicle (GNSS, inertial unit, odometer) with the errors that Cannelle (2013)
 // found. It is smooth from second to second, but wrong by metres where satellites are masked, by other amounts on every
 // pass, and its stated sigmas are too small.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include "io/simulate/scene/scene.h"

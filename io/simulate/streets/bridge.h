@@ -11,6 +11,7 @@
 //     rise = kHeight / 2 (1 + cos(pi (r - kFlat) / (half_length - kFlat)))    up to half_length, then 0,
 //
 // which meets the road and the flat part without a kink.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,5 @@
 // Gives the paths of vehicles over the grid of streets.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -2,6 +2,7 @@
 //
 // The axes of the streets are x = i S and y = j S for all integers i, j, where S is the spacing. Houses stand on the
 // ground between them, up to about kFacade metres from the axes.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include "io/simulate/scene/simulated_block.h"

@@ -2,6 +2,7 @@
 //
 // Seen from a street, the scene is a channel: the road z = ground(x, y) up to the facades, and vertical facades up to
 // 12 m. A line of sight that leaves the streets in plan is blocked by houses, whatever their height.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include "io/simulate/scene/scene.h"

@@ -2,6 +2,7 @@
 // io/ use it.
 //
 // Absent vectors are rows of NaN, so that every column has one row per item.
+// Internal to io/: it is not installed.
 #pragma once
 
 #include <Eigen/Core>

@@ -9,7 +9,7 @@
 #include <random>
 #include <set>
 
-#include "adjust/models/model_assembly.h"
+#include "adjust/independent_models/model_assembly.h"
 #include "geometry/transform/rotation.h"
 #include "tests/spec/reached.h"
 

@@ -10,13 +10,13 @@
 // The test of an entry. The residual of an entry from the weighted mean of all has the variance sigma^2 (1 - w / sum
 // w). Its square over that is chi-square with three degrees of freedom, up to the factor by which all stated sigmas are
 // too small (inflation()).
-#include "adjust/models/place_adjustment.h"
+#include "adjust/independent_models/place_adjustment.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
-#include "adjust/models/similarity_equations.h"
+#include "adjust/independent_models/similarity_equations.h"
 #include "geometry/numbers/chi_square.h"
 #include "geometry/transform/rotation.h"
 #include "io/base/disjoint_sets.h"

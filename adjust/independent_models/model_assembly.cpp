@@ -4,12 +4,12 @@
 //
 //     given model -> common frame:  X = S (x - c_m),
 //     a step about the origin of b as one about its centroid:  w, q as they are,  d + w x c_b + q c_b.
-#include "adjust/models/model_assembly.h"
+#include "adjust/independent_models/model_assembly.h"
 
 #include <cmath>
 
-#include "adjust/models/linked_models.h"
-#include "adjust/models/place_adjustment.h"
+#include "adjust/independent_models/linked_models.h"
+#include "adjust/independent_models/place_adjustment.h"
 #include "geometry/transform/rotation.h"
 #include "io/base/error.h"
 

@@ -7,9 +7,10 @@
 // The frame of each connected part is that of its model with the lowest number, whose similarity is the identity.
 // Models, points and images are taken in the order of their numbers, so that the result has the same bits in any order
 // of input.
+// Internal to adjust/: it is not installed.
 #pragma once
 
-#include "adjust/models/model_link.h"
+#include "adjust/independent_models/model_link.h"
 
 namespace megablock {
 

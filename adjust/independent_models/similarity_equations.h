@@ -1,5 +1,6 @@
 // Holds and solves the normal equations of an adjustment of similarities. Each model has seven unknowns
 // (SimilarityStep). The factorisation is a sparse Cholesky factorisation and also gives the covariance of each model.
+// Internal to adjust/: it is not installed.
 #pragma once
 
 #include <Eigen/SparseCholesky>

@@ -1,12 +1,12 @@
 // Links of two models: their similarities, and the covariances of these.
-#include "adjust/models/model_link.h"
+#include "adjust/independent_models/model_link.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "adjust/models/model_assembly.h"
-#include "adjust/models/similarity_equations.h"
+#include "adjust/independent_models/model_assembly.h"
+#include "adjust/independent_models/similarity_equations.h"
 #include "geometry/numbers/chi_square.h"
 #include "geometry/similarity/similarity_adjustment.h"
 #include "tests/support/adjust/model_grid.h"

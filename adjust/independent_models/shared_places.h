@@ -1,4 +1,5 @@
 // Lists the points and images that two or more models hold, and checks the models.
+// Internal to adjust/: it is not installed.
 #pragma once
 
 #include <fmt/core.h>
@@ -8,8 +9,8 @@
 #include <tuple>
 #include <vector>
 
-#include "adjust/models/model_link.h"
-#include "adjust/models/similarity_equations.h"
+#include "adjust/independent_models/model_link.h"
+#include "adjust/independent_models/similarity_equations.h"
 #include "io/base/error.h"
 
 namespace megablock {

@@ -9,7 +9,7 @@
 //
 // The width of the loss in average_links() is the value that chi-square(7) exceeds with one per cent, inflated in the
 // same way. A good link, with squares of about 7, keeps half of its weight; one of ten times the width a hundredth.
-#include "adjust/models/linked_models.h"
+#include "adjust/independent_models/linked_models.h"
 
 #include <fmt/core.h>
 
@@ -19,7 +19,7 @@
 #include <map>
 #include <numeric>
 
-#include "adjust/models/similarity_equations.h"
+#include "adjust/independent_models/similarity_equations.h"
 #include "geometry/numbers/chi_square.h"
 #include "geometry/numbers/median.h"
 #include "geometry/transform/rotation.h"

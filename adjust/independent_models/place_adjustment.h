@@ -12,9 +12,10 @@
 // by sparse Cholesky factorisation. Points and images are tested in the first half of the iterations, and may come
 // back; the worst entry of a point or image is left out first. Models that are then no longer held together are taken
 // apart.
+// Internal to adjust/: it is not installed.
 #pragma once
 
-#include "adjust/models/linked_models.h"
+#include "adjust/independent_models/linked_models.h"
 
 namespace megablock {
 

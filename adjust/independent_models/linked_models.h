@@ -10,12 +10,13 @@
 //
 // with the weights w = (1 + e' P e / c)^-2 of Geman and McClure against outliers. Their width c follows the median
 // misfit.
+// Internal to adjust/: it is not installed.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "adjust/models/shared_places.h"
+#include "adjust/independent_models/shared_places.h"
 #include "io/evaluation/parts.h"
 
 namespace megablock {

@@ -5,7 +5,7 @@
 // With `scale_sigmas` the variances are known up to a factor for places and one for attitudes. Both follow from
 // medians. Of m equations, 7 are used up by the similarity, so that the median of a squared residual is expected to be
 // chi^2_0.5(3) (m - 7) / m.
-#include "adjust/models/model_link.h"
+#include "adjust/independent_models/model_link.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

@@ -13,6 +13,7 @@
 // The start is the best of samples, by the sum of squares truncated at a threshold. A sample is three points or centres
 // (minimal_similarity.h), or one image's attitude with the distance of two of them. Least squares over the inliers
 // improve it until the inliers no longer change. The draws depend on the numbers of the two models alone.
+// Internal to adjust/: it is not installed.
 #pragma once
 
 #include <cstdint>

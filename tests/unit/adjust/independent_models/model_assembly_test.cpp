@@ -1,13 +1,13 @@
 // Models of a known grid, each in a frame of its own, come together again.
-#include "adjust/models/model_assembly.h"
+#include "adjust/independent_models/model_assembly.h"
 
 #include <gtest/gtest.h>
 
 #include <map>
 #include <random>
 
-#include "adjust/models/shared_places.h"
-#include "adjust/models/similarity_equations.h"
+#include "adjust/independent_models/shared_places.h"
+#include "adjust/independent_models/similarity_equations.h"
 #include "io/base/error.h"
 #include "tests/support/adjust/model_grid.h"
 
