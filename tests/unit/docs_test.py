@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks that everything that the documents name exists: links and their headings, paths, ctest patterns. Also
-checks that the documents name everything that the code has: folders, commands with their options, keys that a
-command prints.
+checks that the documents name everything that the code has: folders, commands with their options, camera
+models, keys that a command prints.
 usage: docs_test.py SOURCE_FOLDER"""
 import pathlib
 import re
@@ -89,6 +89,19 @@ problems += [f"docs/reference/commands.md: the option {option} is missing"
              for option in sorted(options) if f"`{option}`" not in commands]
 problems += [f"docs/reference/commands.md: the command {name} is missing"
              for name in re.findall(r'add_subcommand\(\s*"([\w-]+)"', code) if f"\n## {name}\n" not in commands]
+
+# The table of the camera models has every model, and the list of the features has it, too.
+table = (source / "docs/reference/project-file.md").read_text().split("### Camera models\n")[1].split("\n#")[0]
+described = {name.removesuffix("-N") for row in re.findall(r"^\| (`[^|]+) \|", table, re.MULTILINE)
+             for name in re.findall(r"`([\w-]+)`", row)} - {"model"}
+models = {name for path in (source / "geometry/camera/models").glob("*.h")
+          for name in re.findall(r'kName = "([\w-]+)"', path.read_text())}
+features = (source / "docs/reference/features.md").read_text()
+checked += len(models)
+problems += [f"docs/reference/project-file.md: the camera model {name} is missing, or is not in the code"
+             for name in sorted(models ^ described)]
+problems += [f"docs/reference/features.md: the camera model {name} is missing"
+             for name in sorted(models) if f"`{name}`" not in features]
 
 # Folders and files of the code that a document names.
 in_the_tree = re.compile(r"`((?:geometry|io|partition|match|adjust|merge|cluster|examples|cmake)/[\w./-]*\w)`")

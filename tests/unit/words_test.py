@@ -16,8 +16,8 @@ import re
 import sys
 
 ROOMS = ("geometry", "io", "partition", "match", "adjust", "merge", "cluster", "tests", "docs", "examples", "cmake")
-CODES = re.compile(r"\b(?:CN|KP|CP|AT|KL)-[0-9]+|\bM[0-9]{1,2}\b")
-CODES_IN_TEXT = re.compile(r"\b(?:CN|KP|CP|AT|KL)-[0-9]+")  # a string literal may hold an SVG path, "M0 0"
+CODES = re.compile(r"\bT?(?:CN|KP|CP|AT|KL)-?[0-9]+|\bM[0-9]{1,2}\b")
+CODES_IN_TEXT = re.compile(r"\bT?(?:CN|KP|CP|AT|KL)-?[0-9]+")  # a string literal may hold an SVG path, "M0 0"
 CODES_ALLOWED = ("docs/reference/methods.md", "tests/")
 
 # (word, what to say instead, contexts in which it is ordinary English)
