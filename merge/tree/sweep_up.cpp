@@ -153,7 +153,7 @@ void MergeTreeRunner::record(std::int64_t node, const UpdateMatrix& update) {
   if (update_leaves(node)) sent_subtrees_.push_back(node);
 
   SweepRecord record;
-  std::set<std::int64_t> subtrees(sent_subtrees_.begin(), left_.end());
+  std::set<std::int64_t> subtrees(sent_subtrees_.begin(), sent_subtrees_.end());
   for (const auto& [n, waiting] : updates) subtrees.insert(n);
   record.subtrees.assign(subtrees.begin(), subtrees.end());
   const std::vector<bool> done = nodes_of(record.subtrees);
