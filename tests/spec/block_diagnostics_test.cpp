@@ -38,7 +38,7 @@ class AT36 : public testing::Test {
     simulated_ = simulate_block(options);
     std::map<std::int64_t, std::vector<FrameIndex>> lines;
     for (FrameIndex f(0); simulated_.block.frames.contains(f); ++f.value)
-      lines[simulated_.block.frames[f].sweep].push_back(f);
+      lines[simulated_.block.frames[f].pass].push_back(f);
     for (const auto& line : lines) lines_.push_back(line.second);
   }
 

@@ -38,7 +38,7 @@ class MergeCheckpoint {
   // Deletes all checkpoints, when the result is written. Rank 0 calls it.
   void clear();
 
-  // For records of sweeps (sweep_recorder.h). of_pass(): the position in the form that a record holds. find_pass() is
+  // For records of sweeps (sweep_recorder.h). of_sweep(): the position in the form that a record holds. find_sweep() is
   // collective: it gives the furthest position of all ranks' records of a sweep from the state of `start`, which is the
   // last checkpoint or the beginning. Other records are dropped.
   SweepRecorder::Position of_sweep(const MergePosition& position) const;
