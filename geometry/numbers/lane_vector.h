@@ -10,6 +10,8 @@
 //
 // The loops over lanes have a fixed length and must be unrolled; otherwise the compiler keeps the arrays they index in
 // memory instead of registers. Hence the many pragmas.
+//
+// Internal to megablock: it is not installed.
 #pragma once
 
 #include <cstdint>

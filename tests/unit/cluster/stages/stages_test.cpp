@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <iterator>
+#include <regex>
 #include <set>
 #include <string>
 #include <vector>
@@ -51,7 +52,9 @@ TEST(Stages, AreListedInTheGuideAndTheirCommandsInTheReference) {
     names.emplace_back(stage.name);
     if (stage.help != nullptr) commands.emplace_back(stage.command);
   }
-  EXPECT_THAT(document("guide/first-block.md"), HasSubstr("The stages are " + list_of(names, " and ") + ".\n"));
+  std::string guide = document("guide/first-block.md");  // its lines may break anywhere in the list
+  guide = std::regex_replace(guide, std::regex("\\s+"), " ");
+  EXPECT_THAT(guide, HasSubstr("The stages are " + list_of(names, " and ") + "."));
   EXPECT_THAT(document("reference/commands.md"), HasSubstr("\n## " + list_of(commands, ", ") + "\n"));
 }
 

@@ -389,7 +389,7 @@ TEST(Project, RefusalsNameFileAndLine) {
   EXPECT_THAT(refusal(folder, images + "cameras: {grouping: colour}\n"), HasSubstr("not one of: exif, folder, one"));
   EXPECT_THAT(refusal(folder, images + "cameras: {Nikon: {focal_px: 3}}\n"),
               HasSubstr("block.yaml:2: cameras: no camera is named 'Nikon'; the cameras are 'DJI FC300S"));
-  EXPECT_THAT(refusal(folder, images + "cameras: {default: {focal_mm: 3}}\n"), HasSubstr("belong together"));
+  EXPECT_THAT(refusal(folder, images + "cameras: {default: {focal_mm: 3}}\n"), HasSubstr("focal_mm needs sensor_mm"));
   EXPECT_THAT(refusal(folder, images + "cameras: {default: {focal_px: 3, focal_mm: 3, sensor_mm: 2}}\n"),
               HasSubstr("not both"));
   EXPECT_THAT(refusal(folder, images + "cameras: {default: {calibrate: [k9]}}\n"),

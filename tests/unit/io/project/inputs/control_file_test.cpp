@@ -83,9 +83,12 @@ TEST_F(ControlFile, GcpListInEveryNameOfUtmMeansTheSamePlace) {
 TEST_F(ControlFile, GcpListRefusals) {
   const std::string good = "13.4 52.52 40 5 6 sub/0.jpg a\n";
   EXPECT_EQ(refusal("gcp_list.txt", "WGS84\n" + good), "");
-  EXPECT_EQ(refusal("gcp_list.txt", "WGS84\n" + good + "13.4 52.52 40 5 6 DSC7.jpg a\n"),
-            "gcp_list.txt:3: point 'a' is measured in image 'DSC7.jpg', which the block does not have");
-  EXPECT_THAT(refusal("gcp_list.txt", "WGS84\n13.4 52.52 40 5\n"), HasSubstr("gcp_list.txt:2: 4 fields; expected"));
+  EXPECT_EQ(
+      refusal("gcp_list.txt", "WGS84\n" + good + "13.4 52.52 40 5 6 DSC7.jpg a\n"),
+      "gcp_list.txt:3: point 'a' is measured in image 'DSC7.jpg', which the block does not have; correct the name or "
+      "delete the measurement");
+  EXPECT_THAT(refusal("gcp_list.txt", "WGS84\n13.4 52.52 40 5\n"),
+              HasSubstr("gcp_list.txt:2: 4 fields in this line; expected"));
   EXPECT_THAT(refusal("gcp_list.txt", "WGS84\nx 52.52 40 5 6 sub/0.jpg\n"), HasSubstr("gcp_list.txt:2: x: 'x' is not"));
   EXPECT_THAT(refusal("gcp_list.txt", "WGS84\n13.4 52.52 40 500 6 sub/0.jpg a\n"),
               HasSubstr("outside image 'sub/0.jpg'"));
@@ -98,7 +101,7 @@ TEST_F(ControlFile, GcpListRefusals) {
   EXPECT_THAT(refusal("gcp_list.txt", "WGS84\n52.52 113.4 40 5 6 sub/0.jpg a\n"), HasSubstr("gcp_list.txt:2"));
   EXPECT_THAT(refusal("gcp_list.txt", "EPSG:25832\n1e300 5 40 5 6 sub/0.jpg a\n"),
               HasSubstr("gcp_list.txt:2: x: 1e+300 is beyond any place on Earth"));
-  EXPECT_THAT(refusal("gcp_list.txt", ""), HasSubstr("gcp_list.txt: is empty"));
+  EXPECT_THAT(refusal("gcp_list.txt", ""), HasSubstr("gcp_list.txt: the file is empty"));
   EXPECT_THAT(message_of<InputError>([&] { read_control_table(folder_.path("none.txt")); }),
               HasSubstr("none.txt: cannot be read: no such file or directory; check the path"));
   std::filesystem::create_directories(folder_.path("folder.csv"));
@@ -191,7 +194,9 @@ TEST_F(ControlFile, MeasurementsInImagesLeftOutAreWarnings) {
   const Project project =
       read("gcp_list.txt", "WGS84\n13.4 52.52 40 5 6 broken.jpg a\n13.4 52.52 40 5 6 sub/0.jpg a\n");
   EXPECT_THAT(project.block.control_points[0].measurements, SizeIs(1));
-  EXPECT_THAT(project.warnings, ElementsAre(HasSubstr("gcp_list.txt:2: point 'a' is measured in 'broken.jpg'")));
+  EXPECT_THAT(project.warnings,
+              ElementsAre(HasSubstr("gcp_list.txt:2: the measurement of point 'a' is not used, because "
+                                    "image 'broken.jpg' was left out")));
 }
 
 TEST_F(ControlFile, SettingsOfTheProjectOverrideTheFile) {

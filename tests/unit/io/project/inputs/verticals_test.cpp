@@ -75,7 +75,8 @@ TEST_F(VerticalsFile, ComesBack) {
 }
 
 TEST_F(VerticalsFile, BadRowsAreNamed) {
-  EXPECT_THAT(message(plain_ + "nowhere.jpg,0,1,0,0.1\n"), HasSubstr("verticals.csv:2: image 'nowhere.jpg'"));
+  EXPECT_THAT(message(plain_ + "nowhere.jpg,0,1,0,0.1\n"),
+              HasSubstr("verticals.csv:2: the block has no image 'nowhere.jpg'"));
   EXPECT_THAT(message(plain_ + "2.jpg,0,1,0,0.1\n2.jpg,0,1,0,0.1\n"), HasSubstr("verticals.csv:3: image '2.jpg'"));
   EXPECT_THAT(message(plain_ + "2.jpg,0,1,0,0\n"), HasSubstr("sigma_deg must lie in ["));
   EXPECT_THAT(message(plain_ + "2.jpg,nan,1,0,0.1\n"), HasSubstr("down_x"));
@@ -86,10 +87,10 @@ TEST_F(VerticalsFile, BadRowsAreNamed) {
       "image,down_x,down_y,down_z,sigma_roll_deg,sigma_pitch_deg,correlation,camera,down_by_camera\n";
   EXPECT_THAT(message(angles + "2.jpg,0,1,0,0.1,0,0,,\n"), HasSubstr("sigma_pitch_deg"));
   EXPECT_THAT(message(angles + "2.jpg,0,1,0,0.1,0.1,1,,\n"), HasSubstr("correlation"));
-  EXPECT_THAT(message(angles + "2.jpg,0,0,1,0.1,0.1,0,,\n"), HasSubstr("straight down"));
+  EXPECT_THAT(message(angles + "2.jpg,0,0,1,0.1,0.1,0,,\n"), HasSubstr("straight up or down"));
   EXPECT_THAT(message(angles + "2.jpg,0,1,0,0.1,0.1,0,1 2,1 2 3\n"), HasSubstr("three numbers for each"));
   EXPECT_THAT(message(angles + "2.jpg,0,1,0,0.1,0.1,0,1,1 x 3\n"), HasSubstr("'x' is not a number"));
-  EXPECT_THAT(message(angles + "2.jpg,0,1,0,0.1,0.1,0,1,1 2 3\n"), HasSubstr("another model"));
+  EXPECT_THAT(message(angles + "2.jpg,0,1,0,0.1,0.1,0,1,1 2 3\n"), HasSubstr("another camera model"));
 }
 
 // Names of images say little: 0001.jpg comes from every camera.
