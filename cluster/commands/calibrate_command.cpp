@@ -84,7 +84,7 @@ void add_calibrate(CLI::App& app, std::function<int()>& action, Communicator& ra
   command->add_option("--threads", options->threads, "Threads per rank; 0 = cores of the host / ranks on it")
       ->check(threads());
   add_log_level(*command, options->log.level);
-  command->add_flag("-q,--quiet", options->quiet, "No progress");
+  command->add_flag("-q,--quiet", options->quiet, "Do not show progress");
   add_rig_options(*command, *settings);
   auto modes = std::make_shared<std::vector<CalibrateMode>>();  // a function of its own file adds each of them
   modes->push_back(add_panoramic(*command));

@@ -107,8 +107,8 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
   command
       ->add_option(
           "--scratch", options->scratch_mib,
-          "All files per rank in the job's scratch during the merge, MiB; beyond it (0: at once) tiles stay in memory, "
-          "factors are computed again, sweeps are not recorded")
+          "Most disk space per rank in the job's scratch during the merge, MiB; when it is used up (0: at once) tiles "
+          "stay in memory, factors are computed again, sweeps are not recorded")
       ->check(mebibytes(kMostMib));
   command
       ->add_option(
@@ -119,11 +119,12 @@ void add_run(CLI::App& app, Action& action, Communicator& ranks, const std::stri
   auto level = std::make_shared<std::string>();  // read before there is a parser
   command
       ->add_option(kArithmeticOption, *level,
-                   "Of the whole job, avx2 or avx512: faster dense algebra, other last digits. Default: avx2")
+                   "Instructions of the whole job, avx2 or avx512: the latter is faster and gives other last digits. "
+                   "Default: avx2")
       ->check(CLI::IsMember(std::vector<std::string>(std::begin(kArithmeticLevels), std::end(kArithmeticLevels))));
   command->add_flag("--strict", options->strict, "End at the first failed unit");
   add_log_level(*command, options->log.level);
-  command->add_flag("-q,--quiet", options->quiet, "No progress");
+  command->add_flag("-q,--quiet", options->quiet, "Do not show progress");
   auto monolithic = std::make_shared<bool>(false);
   if (last != nullptr && last->iterates)
     command->add_flag("--monolithic", *monolithic,
@@ -410,7 +411,9 @@ int run_action(const CLI::App& app, const Action& action, Communicator& ranks) {
 }  // namespace
 
 int command_line(int argc, char** argv) {
-  CLI::App app{"megablock orients image blocks of any size: tiles on ranks, exact block-wise compensation, resumable."};
+  CLI::App app{
+      "megablock orients image blocks of any size: it adjusts them in tiles on several processes, exactly and "
+      "resumably."};
   app.name("megablock");
   app.formatter(std::make_shared<HelpText>());
   app.set_version_flag("--version", std::string(kProgram) + " (arithmetic level " + arithmetic_level() + ")");

@@ -110,7 +110,7 @@ void add_register(CLI::App& app, std::function<int()>& action, Communicator& ran
   command->add_option("--threads", options->run.threads, "Threads per rank; 0 = cores of the host / ranks on it")
       ->check(threads());
   add_log_level(*command, options->run.log.level);
-  command->add_flag("-q,--quiet", options->run.quiet, "No progress");
+  command->add_flag("-q,--quiet", options->run.quiet, "Do not show progress");
   command->add_flag_callback(
       "--hold-rig", [options] { options->settings.estimate_rig = false; },
       "Cameras and mounts as given; else free ones are estimated first");

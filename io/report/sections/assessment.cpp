@@ -108,7 +108,9 @@ std::string residuals_item(const BlockResult& result, const Figures& f) {
     return list + item("look", "Residuals are " + fixed(s0, 1) + " times as large as the stated sigmas predict.");
   if (s0 < 0.5)
     return list + item("look", "Residuals are much smaller than the stated sigmas predict (σ₀ " + fixed(s0, 2) + ").");
-  return list.empty() ? item("good", "Residuals agree with the stated sigmas (σ₀ " + fixed(s0, 2) + ").") : list;
+  return list.empty() ? item("good", "Residuals agree with their sigmas (σ₀ " + fixed(s0, 2) +
+                                         "; the sigma of tie points is estimated).")
+                      : list;
 }
 
 std::string unused_points_item(const BlockResult& result) {

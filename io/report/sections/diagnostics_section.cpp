@@ -274,7 +274,8 @@ class DiagnosticsText {
     if (d_.footprints.empty())
       item(true, "No footprint could be calculated, because heights above ground or attitudes are unknown.");
     else if (d_.thin_ground.empty())
-      item(false, fmt::format("At least {} images see all ground between the images.", d_.requested.min_images));
+      item(false, fmt::format("By their footprints, at least {} images see all ground between the images.",
+                              d_.requested.min_images));
     else
       item(true, fmt::format("{} of ground between the images, in {} {}, are seen by fewer than {} images.",
                              area_text(area), count_of(d_.thin_ground), d_.thin_ground.size() == 1 ? "piece" : "pieces",

@@ -96,8 +96,8 @@ std::string coverage_section(const BlockResult& result, const Figures& f, const 
   const std::string drawing = draw_coverage(result, subject.selected, subject.unit, after_reading);
   if (drawing.empty()) return "";
   std::string caption =
-      "Coverage: number of images with kept observations of the tie points in each cell. Where only one or two images "
-      "see a place, nothing checks its points.";
+      "Coverage: number of images with kept observations of the tie points in each cell. Points that only "
+      "two images see are hardly checked.";
   if (subjects.size() > 1) caption += " Only the part on the first map is shown.";
   return section("coverage", "Coverage", coverage_legend() + figure(drawing, caption));
 }

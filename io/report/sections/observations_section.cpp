@@ -89,10 +89,13 @@ std::string observations_section(const BlockResult& result, const Figures& figur
   table.add({"all", count(number), fixed(redundancy, 1), percent(redundancy, static_cast<double>(number)),
              result.degrees_of_freedom > 0 ? fixed(std::sqrt(std::max(0.0, result.variance_factor)), 2) : kMissing},
             "sum");
-  return section("observations", "Observations and their sigmas",
-                 paragraph("Redundancy tells how many of the observations of a kind all others check. The last column "
-                           "is the sigma that the residuals show, over the stated one (1: as stated).") +
-                     table.html("compact") + reliability_part(result, figures.reliability));
+  return section(
+      "observations", "Observations and their sigmas",
+      paragraph("Numbers count every coordinate and angle. Redundancy: how many observations of a kind could be "
+                "dropped because the others determine them. The last column is the sigma that the residuals "
+                "show, over the one they were weighted with (1: equal); that of the tie points is estimated, so "
+                "it is near 1 in any block.") +
+          table.html("compact") + reliability_part(result, figures.reliability));
 }
 
 }  // namespace megablock::report

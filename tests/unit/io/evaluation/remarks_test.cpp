@@ -112,7 +112,7 @@ TEST(Remarks, TiePointsThatFitFarWorseThanAssumed) {
                 "'adjustment: {use_position_priors: false, use_attitude_priors: false}' to see how the images "
                 "alone fit");
   EXPECT_THAT(report_html(result), testing::AllOf(HasSubstr("<li class=look>Tie points fit to 3.9 px only"),
-                                                  testing::Not(HasSubstr("Residuals agree with the stated sigmas"))));
+                                                  testing::Not(HasSubstr("Residuals agree with their sigmas"))));
   for (Frame& frame : result.block.frames) frame.position_prior.reset(), frame.attitude_prior.reset();
   EXPECT_EQ(remark()[0],
             start + "the camera model is wrong, or many matches are wrong; see cameras and images in the report");
