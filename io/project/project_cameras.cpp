@@ -14,20 +14,22 @@ namespace fs = std::filesystem;
 namespace {
 
 // The parameters that a name in `calibrate: [...]` stands for: one parameter, or one of two groups.
-std::vector<int> parameters_named(const CameraModel& model, const std::string& name, const std::string& where) {
+std::vector<int> parameters_named(const Camera& camera, const std::string& name, const std::string& where) {
+  const CameraModel& model = camera.intrinsics.model();
   if (name == "focal") return {kFocal};
   if (name == "principal_point") return {kPrincipalX, kPrincipalY};
   if (const auto parameter = find_parameter(model, name)) return {*parameter};
   std::string list = "focal, principal_point";
   for (int p = 0; p < parameter_count(model); ++p) list += ", " + parameter_name(model, p);
-  throw InputError(where + ": calibrate: '" + name + "' is not a camera parameter; the parameters are " + list);
+  throw InputError(where + ": calibrate: '" + name + "' is not a parameter of camera '" + camera.name + "' (model " +
+                   model_name(model) + "); its parameters are " + list);
 }
 
 void hold_except(const YAML::Node& list, const std::string& where, Camera& camera) {
   const CameraModel& model = camera.intrinsics.model();
   IntrinsicSigmas sigma{};
   for (const auto& item : list)
-    for (const int p : parameters_named(model, item.IsScalar() ? item.Scalar() : "", where)) {
+    for (const int p : parameters_named(camera, item.IsScalar() ? item.Scalar() : "", where)) {
       if (is_fixed(model, p))
         throw InputError(where + ": calibrate: '" + parameter_name(model, p) + "' of the model " + model_name(model) +
                          " follows from the size of the image and cannot be estimated; take it out of 'calibrate'");

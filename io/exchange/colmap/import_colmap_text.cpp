@@ -44,9 +44,18 @@ class TextReader {
     return value;
   }
 
+  // The next number of the same line. A line that is too short must not take the numbers of the next one.
+  static void need_more(NumberReader& reader, const char* what) {
+    if (!reader.line_has_more()) reader.fail(std::string("the line ends before ") + what);
+  }
+  static double number_here(NumberReader& reader, const char* what) {
+    need_more(reader, what);
+    return reader.number(what);
+  }
+
   void read_point(NumberReader& reader, const std::string& first) {
     Eigen::Vector3d point;
-    for (double& value : point) value = reader.number("a point's coordinates");
+    for (double& value : point) value = number_here(reader, "a point's coordinates");
     reader.rest_of_line();  // colour, error and track; the tracks are made from the images
     builder_.add_point(parse_id(reader, first, "a point's id"), point);
   }
@@ -57,8 +66,9 @@ class TextReader {
     const std::int64_t width = reader.integer("a camera's width", 1, kMany);
     const std::int64_t height = reader.integer("a camera's height", 1, kMany);
     std::vector<double> parameters;
-    for (std::size_t i = 0; i < form.parameters.size(); ++i)
-      parameters.push_back(reader.number("a camera's parameters"));
+    const std::string all = "all " + std::to_string(form.parameters.size()) + " parameters of " + form.name;
+    for (std::size_t i = 0; i < form.parameters.size(); ++i) parameters.push_back(number_here(reader, all.c_str()));
+    if (reader.line_has_more()) reader.fail("the line has more than " + all);
     builder_.add_camera(id, form, width, height, parameters);
     reader.rest_of_line();
   }
@@ -67,13 +77,15 @@ class TextReader {
     const std::int64_t id = parse_id(reader, first, "an image's id");
     std::array<double, 4> q;
     Eigen::Vector3d translation;
-    for (double& value : q) value = reader.number("an image's rotation");
-    for (double& value : translation) value = reader.number("an image's translation");
+    for (double& value : q) value = number_here(reader, "an image's rotation");
+    for (double& value : translation) value = number_here(reader, "an image's translation");
     const std::int64_t camera = reader.integer("an image's camera", 0, kMany);
     builder_.add_image(id, q, translation, camera, std::string(reader.rest_of_line()));
     while (reader.line_has_more()) {
-      const double x = reader.number("x of an observation", kFarthestPixel),
-                   y = reader.number("y of an observation", kFarthestPixel);
+      const double x = reader.number("x of an observation", kFarthestPixel);
+      need_more(reader, "y of an observation");
+      const double y = reader.number("y of an observation", kFarthestPixel);
+      need_more(reader, "the point of an observation");
       builder_.add_observation(x, y, reader.integer("point of an observation", -1, kMany));
     }
     reader.rest_of_line();

@@ -24,6 +24,7 @@ using fixture::read_file;
 using fixture::small_result;
 using fixture::write_file;
 using fixture::write_image_file;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 Block every_camera() {
@@ -107,8 +108,8 @@ TEST_F(CameraModelProject, RefusesByLine) {
   EXPECT_THAT(refusal("    model: ign-radial\n    distortion: {k1: 0.1}\n"),
               HasSubstr("block.yaml:5: unknown key 'k1'"));
   EXPECT_THAT(refusal("    model: pinhole\n    calibrate: [k1]\n"),
-              HasSubstr("block.yaml:5: calibrate: 'k1' is not a camera parameter; the parameters are focal, "
-                        "principal_point, f, cx, cy"));
+              AllOf(HasSubstr("block.yaml:5: calibrate: 'k1' is not a parameter of camera '"),
+                    HasSubstr("(model pinhole); its parameters are focal, principal_point, f, cx, cy")));
   EXPECT_THAT(refusal("    model: legendre-2\n    calibrate: [width]\n"), HasSubstr("size of the image"));
   EXPECT_THAT(refusal("    model: equirectangular\n    focal_px: 300\n"), HasSubstr("block.yaml:5: the focal length"));
 }

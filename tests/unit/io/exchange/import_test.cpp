@@ -233,6 +233,12 @@ TEST(Import, BadColmapModelsAreRefusedByLine) {
   EXPECT_THAT(refusal("1 FISHEYE 100 80 90 50 40\n", image, ""), HasSubstr("cameras.txt:1: camera model 'FISHEYE'"));
   EXPECT_THAT(refusal("1 PINHOLE 100 80 90 91 50 40\n", image, ""), HasSubstr("square pixels"));
   EXPECT_THAT(refusal("x PINHOLE 100 80 90 90 50 40\n", image, ""), HasSubstr("'x' is not a whole number"));
+  EXPECT_THAT(refusal("1 SIMPLE_RADIAL 100 80 90 50 40\n2 SIMPLE_RADIAL 100 80 90 50 40 -0.1\n", image, ""),
+              HasSubstr("cameras.txt:1: the line ends before all 4 parameters of SIMPLE_RADIAL"));
+  EXPECT_THAT(refusal("1 PINHOLE 100 80 90 90 50 40 0.1\n", image, ""),
+              HasSubstr("cameras.txt:1: the line has more than all 4 parameters of PINHOLE"));
+  EXPECT_THAT(refusal(camera, "1 1 0 0 0 0 0\n0 1 a.jpg\n\n", ""),
+              HasSubstr("images.txt:1: the line ends before an image's translation"));
   EXPECT_THAT(refusal(camera, "1 1 0 0 0 0 0 0 2 a.jpg\n\n", ""), HasSubstr("names a camera"));
   EXPECT_THAT(refusal(camera, "1 2 0 0 0 0 0 0 1 a.jpg\n\n", ""), HasSubstr("not a unit quaternion"));
   EXPECT_THAT(refusal(camera, "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0 0 1 a.jpg\n\n", ""),

@@ -393,7 +393,7 @@ TEST(Project, RefusalsNameFileAndLine) {
   EXPECT_THAT(refusal(folder, images + "cameras: {default: {focal_px: 3, focal_mm: 3, sensor_mm: 2}}\n"),
               HasSubstr("not both"));
   EXPECT_THAT(refusal(folder, images + "cameras: {default: {calibrate: [k9]}}\n"),
-              HasSubstr("'k9' is not a camera parameter"));
+              HasSubstr("'k9' is not a parameter of camera 'DJI FC300S 64x48 3.61mm' (model brown)"));
   EXPECT_THAT(refusal(folder, images + "cameras: {default: {mask: none.png}}\n"), HasSubstr("does not exist"));
   EXPECT_THAT(refusal(folder, images + "features: {max_features: [1, 2]}\n"), HasSubstr("must be one plain value"));
   EXPECT_THAT(refusal(folder, images + "features:\n  max_features:\n"), HasSubstr("block.yaml:3: "));
