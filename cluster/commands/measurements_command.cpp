@@ -16,6 +16,7 @@
 #include "io/base/error.h"
 #include "io/base/file_error.h"
 #include "io/result/measurements.h"
+#include "io/text/csv_row.h"
 
 namespace megablock {
 
@@ -73,10 +74,7 @@ Measurements ask(const MeasurementStore& store, const MeasurementsOptions& optio
 
 std::string quoted(const std::string& name, bool json) {
   if (json) return nlohmann::json(name).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  if (name.find_first_of(",\"\n") == std::string::npos) return name;
-  std::string text = "\"";
-  for (const char letter : name) text += letter == '"' ? "\"\"" : std::string(1, letter);
-  return text + "\"";
+  return csv_field(name);
 }
 
 // A number; NaN becomes an empty cell, or null.

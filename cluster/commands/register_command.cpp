@@ -17,6 +17,7 @@
 #include "geometry/numbers/angles.h"
 #include "io/base/error.h"
 #include "io/project/project.h"
+#include "io/text/csv_row.h"
 
 namespace megablock {
 
@@ -57,10 +58,10 @@ int resect(const ResectOptions& options) {
     warned += !s.warnings.empty();
     const Eigen::Quaterniond& q = s.pose.rotation;
     const Eigen::Vector3d& c = s.pose.centre;
-    csv += fmt::format("{},{},{},{},{},{},{},{},{:.5f},{:.5f},{},{},{:.1f},{:.3f},\"{}\"\n", name, q.w(), q.x(), q.y(),
-                       q.z(), c.x(), c.y(), c.z(), std::sqrt(s.covariance.bottomRightCorner<3, 3>().trace()),
+    csv += fmt::format("{},{},{},{},{},{},{},{},{:.5f},{:.5f},{},{},{:.1f},{:.3f},{}\n", csv_field(name), q.w(), q.x(),
+                       q.y(), q.z(), c.x(), c.y(), c.z(), std::sqrt(s.covariance.bottomRightCorner<3, 3>().trace()),
                        std::sqrt(s.covariance.topLeftCorner<3, 3>().trace()) / kDegree, s.points, r.points, s.angle_deg,
-                       s.rms_px, s.warnings.empty() ? "" : s.warnings.front());
+                       s.rms_px, csv_field(s.warnings.empty() ? "" : s.warnings.front()));
   }
   std::printf("%d frames resected (%d with a warning), %d refused\n", resected, warned, refused);
   const std::filesystem::path path = std::filesystem::absolute(options.output);

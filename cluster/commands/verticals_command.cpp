@@ -23,6 +23,7 @@
 #include "io/project/inputs/verticals.h"
 #include "io/project/project.h"
 #include "io/store/job/job_store.h"
+#include "io/text/csv_row.h"
 #include "match/images/image_vertical.h"
 
 namespace megablock {
@@ -104,7 +105,7 @@ SeenVertical seen_vertical(ImageIndex image, const ImageVertical& found, const I
 std::string row_of(const Block& block, ImageIndex i, const ImageVertical& v) {
   const std::string& name = block.name_of(i);
   const std::string found_in = fmt::format("{},{},{}", v.segments, v.vanishing_points, v.lines);
-  if (!v.found) return name + ",,,,,,,,,,," + found_in + ",,,\n";
+  if (!v.found) return csv_field(name) + ",,,,,,,,,,," + found_in + ",,,\n";
   const Camera& camera = block.cameras[block.camera_of(i)];
   const SeenVertical seen = seen_vertical(i, v, camera.intrinsics);
   const Eigen::Matrix2d whole = roll_pitch_of(whole_error(seen, camera, camera.intrinsics)).covariance;

@@ -5,6 +5,7 @@
 
 #include "io/base/error.h"
 #include "io/base/file_error.h"
+#include "io/text/csv_row.h"
 #include "io/text/plausible.h"
 #include "io/text/settings_reader.h"
 
@@ -17,22 +18,6 @@ std::string trimmed(const std::string& text) {
   return first == std::string::npos ? "" : text.substr(first, last - first + 1);
 }
 
-// The fields of a line. Commas inside quotes belong to the field; blanks at its ends do not.
-std::vector<std::string> split(const std::string& line) {
-  std::vector<std::string> fields(1);
-  bool in_quotes = false;
-  for (const char c : line) {
-    if (c == '"')
-      in_quotes = !in_quotes;
-    else if (c == ',' && !in_quotes)
-      fields.emplace_back();
-    else
-      fields.back() += c;
-  }
-  for (std::string& field : fields) field = trimmed(field);
-  return fields;
-}
-
 }  // namespace
 
 void refuse_semicolons(const std::string& header, const std::string& where) {
@@ -43,11 +28,8 @@ void refuse_semicolons(const std::string& header, const std::string& where) {
 
 CsvTable::CsvTable(const std::string& path) : path_(path) {
   std::ifstream stream = open_input(path);
-  std::int64_t number = 0;
-  for (std::string line; std::getline(stream, line);) {
-    ++number;
-    // Programs on Windows often write a byte order mark before the text.
-    if (number == 1 && line.starts_with("\xef\xbb\xbf")) line.erase(0, 3);
+  std::int64_t lines = 0, number = 1;  // of the row's first line
+  for (std::string line; read_csv_row(stream, path, line, lines); number = lines + 1) {
     if (trimmed(line).empty()) continue;
     if (line.front() == '#') {
       const auto colon = line.find(':');
@@ -55,7 +37,7 @@ CsvTable::CsvTable(const std::string& path) : path_(path) {
       continue;
     }
     const std::string place = path + ":" + std::to_string(number);
-    std::vector<std::string> fields = split(line);
+    std::vector<std::string> fields = csv_fields(line);
     if (columns_.empty()) {
       header_line_ = number;
       refuse_semicolons(line, place);

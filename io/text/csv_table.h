@@ -1,5 +1,4 @@
-// Reads a small CSV file: comments ("# key: value"), a header line, rows. Fields may be quoted ("a, b"). Internal to
-// io/.
+// Reads a small CSV file: comments ("# key: value"), a header line, rows as in csv_row.h. Internal to io/.
 #pragma once
 
 #include <map>

@@ -16,6 +16,7 @@
 #include "io/base/hash.h"
 #include "io/store/units/block_file.h"
 #include "io/store/units/tracks_file.h"
+#include "io/text/csv_row.h"
 #include "io/text/plausible.h"
 
 namespace megablock {
@@ -65,20 +66,12 @@ Coverages read_units(const Job& job, const std::vector<Unit>& units) {
   return all;
 }
 
-// A name as a field of a CSV file: in quotes, which are doubled inside, where it has commas or quotes.
-std::string csv_field(const std::string& name) {
-  if (name.find_first_of(",\"") == std::string::npos) return name;
-  std::string field = "\"";
-  for (const char c : name) field += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return field + '"';
-}
-
 std::string table_of(const Coverages& coverage, const NameTable<ImageIndex>& names) {
   std::string csv = "image,observations,covered_share,images_per_point\n";
   for (ImageIndex i(0); coverage.contains(i); ++i.value) {
     const ImageCoverage& c = coverage[i];
     const auto count = static_cast<double>(std::max<std::int64_t>(c.observations, 1));
-    csv += fmt::format("{},{},{:.4f},{:.2f}\n", csv_field(std::string(names[i])), c.observations, c.covered_share(),
+    csv += fmt::format("{},{},{:.4f},{:.2f}\n", csv_field(names[i]), c.observations, c.covered_share(),
                        static_cast<double>(c.images_of_points) / count);
   }
   return csv;

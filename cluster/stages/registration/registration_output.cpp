@@ -7,6 +7,7 @@
 #include "geometry/numbers/angles.h"
 #include "io/project/inputs/pose_csv.h"
 #include "io/store/units/block_file.h"
+#include "io/text/csv_row.h"
 
 namespace megablock {
 
@@ -17,14 +18,15 @@ std::string registrations_csv(const Block& block, const std::vector<RegisteredPl
   std::string text =
       "a,b,c,d,accepted,holds,weight,residual_sigmas,tracks,measurements,kept,median_before_px,median_after_px,"
       "position_sigma_m,rotation_sigma_deg,shift_m,reason\n";
+  const auto name = [&](FrameIndex frame) { return csv_field(block.frames[frame].name); };
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Place& p = rows[i].place;
     const PairRegistration& r = rows[i].registration;
-    text += fmt::format("{},{},{},{},{:d},{:d},{:.4f},{:.3f},{},{},{},{:.3f},{:.3f},{:.5f},{:.5f},{:.3f},\"{}\"\n",
-                        block.frames[p.a].name, block.frames[p.b].name, block.frames[p.c].name, block.frames[p.d].name,
-                        r.accepted, registered.weight[i] >= kHolds, registered.weight[i], registered.residual[i],
-                        r.tracks, r.measurements, r.kept, r.median_before_px, r.median_after_px, r.position_sigma_m,
-                        r.rotation_sigma_deg, r.shift_m, r.reason);
+    text +=
+        fmt::format("{},{},{},{},{:d},{:d},{:.4f},{:.3f},{},{},{},{:.3f},{:.3f},{:.5f},{:.5f},{:.3f},{}\n", name(p.a),
+                    name(p.b), name(p.c), name(p.d), r.accepted, registered.weight[i] >= kHolds, registered.weight[i],
+                    registered.residual[i], r.tracks, r.measurements, r.kept, r.median_before_px, r.median_after_px,
+                    r.position_sigma_m, r.rotation_sigma_deg, r.shift_m, csv_field(r.reason));
   }
   return text;
 }

@@ -8,6 +8,7 @@
 #include "io/exchange/model/export_view.h"
 #include "io/exchange/tables/export_tables.h"
 #include "io/project/inputs/pose_csv.h"
+#include "io/text/csv_row.h"
 #include "io/text/text_writer.h"
 
 namespace megablock {
@@ -54,8 +55,9 @@ void write_local(const ExportView& view, const std::string& path) {
   for (std::int64_t i = 0; i < view.image_count(); ++i) {
     const Image& image = view.image(i);
     const Pose pose = view.pose(i);
-    writer.print("{},{},{},{},{},{}", view.image_name(i), view.result.block.frames[image.frame].name,
-                 view.result.block.cameras[view.camera_index(i)].name, pose.centre.x(), pose.centre.y(),
+    writer.print("{},{},{},{},{},{}", csv_field(view.image_name(i)),
+                 csv_field(view.result.block.frames[image.frame].name),
+                 csv_field(view.result.block.cameras[view.camera_index(i)].name), pose.centre.x(), pose.centre.y(),
                  pose.centre.z());
     print_angles(writer, pose.rotation);
     if (sigmas) print_sigmas(writer, image_covariance(view, i), Eigen::Quaterniond::Identity());
@@ -74,8 +76,8 @@ void write_wgs84(const ExportView& view, const std::string& path) {
   for (std::int64_t i = 0; i < view.image_count(); ++i) {
     const Pose pose = view.pose(i);
     const Geodetic position = georeference.to_geodetic(pose.centre);
-    writer.print("{},{:.11f},{:.11f},{:.5f}", view.image_name(i), position.latitude_deg, position.longitude_deg,
-                 position.height_m);
+    writer.print("{},{:.11f},{:.11f},{:.5f}", csv_field(view.image_name(i)), position.latitude_deg,
+                 position.longitude_deg, position.height_m);
     const Eigen::Quaterniond own = georeference.own_from_block(position);
     // R maps axes of the block's frame; R own' maps those of the place of the image.
     print_angles(writer, pose.rotation * own.conjugate());
@@ -109,7 +111,7 @@ void write_cameras(const BlockResult& result, const std::string& path) {
     const CameraIndex index(static_cast<std::int64_t>(c));
     const Camera& camera = result.block.cameras[index];
     const Intrinsics& k = result.state.cameras[index];
-    writer.print("{},{},{},{}", camera.name, camera.width, camera.height, model_name(k.model()));
+    writer.print("{},{},{},{}", csv_field(camera.name), camera.width, camera.height, model_name(k.model()));
     for (const std::string& name : names)
       if (const auto p = find_parameter(k.model(), name))
         writer.print(",{}", k[*p]);
@@ -142,7 +144,7 @@ void write_mounts(const BlockResult& result, const std::string& path) {
     for (std::size_t m = 0; m < rig.mounts.size(); ++m) {
       const Pose& pose = result.state.mounts[r][m];
       const Eigen::Quaterniond& q = pose.rotation;
-      writer.print("{},{},{}", rig.name, m, result.block.cameras[rig.mounts[m].camera].name);
+      writer.print("{},{},{}", csv_field(rig.name), m, csv_field(result.block.cameras[rig.mounts[m].camera].name));
       for (const double value : {pose.centre.x(), pose.centre.y(), pose.centre.z(), q.w(), q.x(), q.y(), q.z()})
         writer.print(",{}", value);
       if (!result.mount_covariance.empty()) {

@@ -12,6 +12,7 @@
 
 #include "io/base/error.h"
 #include "io/base/file_error.h"
+#include "io/text/csv_row.h"
 #include "io/text/csv_table.h"
 #include "io/text/plausible.h"
 #include "io/text/settings_reader.h"
@@ -261,11 +262,11 @@ void write_control_csv(const std::string& path, const Block& block) {
   writer.print("# crs: local\nname,role,x,y,z,sigma_horizontal_m,sigma_vertical_m,image,column_px,row_px,sigma_px\n");
   for (const ControlPoint& point : block.control_points) {
     const Eigen::Vector3d& p = point.position;
-    const std::string head =
-        fmt::format("{},{},{},{},{},{},{}", point.name, point.role == PointRole::kCheck ? "check" : "control", p.x(),
-                    p.y(), std::isnan(p.z()) ? "" : fmt::format("{}", p.z()), point.sigma.x(), point.sigma.z());
+    const std::string head = fmt::format(
+        "{},{},{},{},{},{},{}", csv_field(point.name), point.role == PointRole::kCheck ? "check" : "control", p.x(),
+        p.y(), std::isnan(p.z()) ? "" : fmt::format("{}", p.z()), point.sigma.x(), point.sigma.z());
     for (const ImageMeasurement& m : point.measurements)
-      writer.print("{},{},{},{},{}\n", head, block.name_of(m.image), m.pixel.x(), m.pixel.y(), m.sigma_px);
+      writer.print("{},{},{},{},{}\n", head, csv_field(block.name_of(m.image)), m.pixel.x(), m.pixel.y(), m.sigma_px);
     if (point.measurements.empty()) writer.print("{},,,,\n", head);
   }
   writer.close();

@@ -11,6 +11,7 @@
 
 #include "io/base/error.h"
 #include "io/base/file_error.h"
+#include "io/text/csv_row.h"
 #include "io/text/csv_table.h"
 #include "io/text/plausible.h"
 
@@ -21,36 +22,27 @@ namespace {
 constexpr std::array<const char*, 8> kColumns = {"name", "qw", "qx", "qy", "qz", "x", "y", "z"};
 constexpr std::size_t kFirstCoordinate = 5;
 
-std::vector<std::string> cells_of(const std::string& line) {
-  std::vector<std::string> fields;
-  std::stringstream stream(line);
-  for (std::string field; std::getline(stream, field, ',');) {
-    const auto first = field.find_first_not_of(" \t\r"), last = field.find_last_not_of(" \t\r");
-    fields.push_back(first == std::string::npos ? "" : field.substr(first, last - first + 1));
-  }
-  return fields;
-}
-
 class CsvReader {
  public:
   explicit CsvReader(const std::string& path) : path_(path), stream_(open_input(path)) {}
 
   PoseTable read() {
-    std::string line;
-    while (std::getline(stream_, line)) {
-      ++line_;
+    std::int64_t lines = 0;
+    for (std::string line; read_csv_row(stream_, path_, line, lines); line_ = lines + 1) {
       if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
       if (line.front() == '#') {
         read_origin(line);
       } else if (columns_.empty()) {
         refuse_semicolons(line, where());
-        read_header(cells_of(line));
+        read_header(csv_fields(line));
       } else {
-        read_row(cells_of(line));
+        read_row(csv_fields(line));
       }
     }
     if (table_.names.empty())
-      fail("the file has no poses; expected a header with the columns name,qw,qx,qy,qz,x,y,z and a line per frame");
+      throw InputError(
+          path_ +
+          ": the file has no poses; expected a header with the columns name,qw,qx,qy,qz,x,y,z and a line per frame");
     return std::move(table_);
   }
 
@@ -115,7 +107,7 @@ class CsvReader {
 
   std::string path_;
   std::ifstream stream_;
-  std::int64_t line_ = 0;
+  std::int64_t line_ = 1;             // the first one of the row
   std::vector<std::size_t> columns_;  // position of each of kColumns in a line
   std::optional<std::size_t> pass_;   // position of the column 'pass'
   std::unordered_set<std::string> seen_;
@@ -148,8 +140,8 @@ void write_pose_csv(const std::string& path, const PoseTable& table) {
   for (std::size_t f = 0; f < table.names.size(); ++f) {
     const Eigen::Quaterniond& q = table.poses[f].rotation;
     const Eigen::Vector3d& c = table.poses[f].centre;
-    stream << table.names[f] << ',' << q.w() << ',' << q.x() << ',' << q.y() << ',' << q.z() << ',' << c.x() << ','
-           << c.y() << ',' << c.z();
+    stream << csv_field(table.names[f]) << ',' << q.w() << ',' << q.x() << ',' << q.y() << ',' << q.z() << ',' << c.x()
+           << ',' << c.y() << ',' << c.z();
     if (!table.passes.empty()) stream << ',' << table.passes[f];
     stream << '\n';
   }

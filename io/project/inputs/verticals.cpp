@@ -13,6 +13,7 @@
 #include "geometry/vanishing/vertical.h"
 #include "io/base/error.h"
 #include "io/project/inputs/camera_priors.h"
+#include "io/text/csv_row.h"
 #include "io/text/csv_table.h"
 #include "io/text/plausible.h"
 
@@ -139,10 +140,10 @@ std::string verticals_row(const SeenVertical& vertical, const std::string& image
   const RollPitch angles = roll_pitch_of({vertical.down, vertical.covariance});
   const double roll = std::sqrt(angles.covariance(0, 0)), pitch = std::sqrt(angles.covariance(1, 1));
   const Eigen::Vector3d& d = vertical.down;
-  return fmt::format("{},{:.12f},{:.12f},{:.12f},{:.6f},{:.6f},{:.9g},{:.9g},{:.9f},{},{}", image, d.x(), d.y(), d.z(),
-                     angles.roll * kDegreesPerRadian, angles.pitch * kDegreesPerRadian, roll * kDegreesPerRadian,
-                     pitch * kDegreesPerRadian, angles.covariance(0, 1) / (roll * pitch), text_of(vertical.camera),
-                     text_of(vertical.by_camera.reshaped()));
+  return fmt::format("{},{:.12f},{:.12f},{:.12f},{:.6f},{:.6f},{:.9g},{:.9g},{:.9f},{},{}", csv_field(image), d.x(),
+                     d.y(), d.z(), angles.roll * kDegreesPerRadian, angles.pitch * kDegreesPerRadian,
+                     roll * kDegreesPerRadian, pitch * kDegreesPerRadian, angles.covariance(0, 1) / (roll * pitch),
+                     text_of(vertical.camera), text_of(vertical.by_camera.reshaped()));
 }
 
 Eigen::Matrix3Xd camera_error(const SeenVertical& vertical, const Camera& camera) {

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "io/result/result.h"
+#include "tests/support/io/image_names.h"
 
 namespace megablock::fixture {
 
@@ -68,6 +69,15 @@ inline BlockResult small_result(bool full_distortion = true) {
   result.tiles.component.assign(4, 0);
   result.boundary.assign(4, 0);
   return result;
+}
+
+// Gives every camera, rig, frame and image a name with a comma, quotes, a line break and '#' in front.
+inline void name_oddly(Block& block) {
+  const auto odd = [](const std::string& name) { return "# \"" + name + "\",\nand so on"; };
+  for (Camera& camera : block.cameras) camera.name = odd(camera.name);
+  for (Rig& rig : block.rigs) rig.name = odd(rig.name);
+  for (Frame& frame : block.frames) frame.name = odd(frame.name);
+  rename_images(block, [&](ImageIndex image) { return odd(block.name_of(image)); });
 }
 
 }  // namespace megablock::fixture

@@ -6,6 +6,7 @@
 
 #include "io/base/error.h"
 #include "io/exchange/export.h"
+#include "io/text/csv_table.h"
 #include "tests/support/io/image_files.h"
 #include "tests/support/io/scratch_directory.h"
 #include "tests/support/io/small_result.h"
@@ -47,6 +48,26 @@ TEST(ExportFiles, RefusesUnknownFormatsAndPlacesItCannotWrite) {
   for (const std::string& format : export_formats())
     EXPECT_NE(message_of<Error>([&] { export_result(result, format, folder.path("file/out")); }), "") << format;
   EXPECT_NE(message_of<InputError>([&] { export_result(result, "bal", "/dev/full"); }), "");
+}
+
+TEST(ExportFiles, TablesHoldAnyName) {
+  ScratchDirectory folder;
+  BlockResult result = small_result();
+  fixture::name_oddly(result.block);
+  export_result(result, "csv", folder.path("out"));
+  const Block& block = result.block;
+  const CsvTable images(folder.path("out/images_local.csv")), cameras(folder.path("out/cameras.csv"));
+  ASSERT_EQ(images.row_count(), 6u);  // of the three frames with an orientation
+  EXPECT_EQ(images.text(0, "image"), block.name_of(ImageIndex(0)));
+  EXPECT_EQ(images.text(0, "frame"), block.frames[FrameIndex(0)].name);
+  EXPECT_EQ(images.text(0, "camera"), block.cameras[CameraIndex(0)].name);
+  EXPECT_EQ(images.number(5, "x_m").has_value(), true);
+  EXPECT_EQ(cameras.text(1, "name"), block.cameras[CameraIndex(1)].name);
+  EXPECT_EQ(cameras.text(1, "width"), "2000");
+  const CsvTable mounts(folder.path("out/mounts.csv"));
+  EXPECT_EQ(mounts.text(1, "rig"), block.rigs[RigIndex(0)].name);
+  EXPECT_EQ(mounts.text(1, "camera"), block.cameras[CameraIndex(1)].name);
+  EXPECT_EQ(mounts.text(1, "x_m"), "0.5");
 }
 
 }  // namespace

@@ -163,6 +163,11 @@ TEST_F(ControlFile, CsvInTheBlocksFrameAndItsWriterReturn) {
   expect_right(block);
   write_control_csv(folder_.path("written.csv"), block);
   expect_right(read("again.csv", fixture::read_file(folder_.path("written.csv"))).block);
+  Block odd = block;
+  odd.control_points[1].name = "corner, \"north\"\nof 3";
+  write_control_csv(folder_.path("written.csv"), odd);
+  const Block again = read("again.csv", fixture::read_file(folder_.path("written.csv"))).block;
+  EXPECT_EQ(again.control_points[1].name, odd.control_points[1].name);
 }
 
 TEST_F(ControlFile, CsvRefusals) {
