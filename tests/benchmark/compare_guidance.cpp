@@ -12,6 +12,7 @@
 
 #include "io/block/tracks.h"
 #include "io/images/image_codec.h"
+#include "io/simulate/blocks/simulate.h"
 #include "io/simulate/images/render.h"
 #include "match/features/features.h"
 #include "match/filter/match_filter.h"

@@ -4,12 +4,13 @@
 // With the height H above mean terrain, the focal length f and an image of w x h pixels, the footprint is w H/f across
 // and h H/f along the line. Successive images are (1 - forward_overlap) h H/f apart, lines (1 - side_overlap) w H/f.
 // The axes of the block have their origin in its middle; z = 0 is the mean terrain.
+#include "io/simulate/blocks/aerial.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "geometry/numbers/angles.h"
-#include "io/simulate/scene/scene.h"
 #include "io/simulate/scene/terrain.h"
 
 namespace megablock {

@@ -1,12 +1,17 @@
 // Simulates control and check points, either spread over the block or in zones on pedestrian crossings.
+#include "io/simulate/blocks/control.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "io/base/error.h"
-#include "io/simulate/scene/scene.h"
 
 namespace megablock {
 
+namespace {
+
+// Simulates a control point with the stated sigma `control_sigma_m`, and its measurements, both with noise. The role is
+// kControl.
 ControlPoint measure_control(const SimulationOptions& options, const Eigen::Vector3d& truth,
                              const std::vector<Sighting>& seen, Random& random) {
   ControlPoint point;
@@ -20,6 +25,8 @@ ControlPoint measure_control(const SimulationOptions& options, const Eigen::Vect
   }
   return point;
 }
+
+}  // namespace
 
 // The places come from an additive recurrence over the extent of the block (Roberts' R2 sequence): the shares are the
 // fractions of 0.5 + i / g and 0.5 + i / g^2, where g is the plastic number, the root of g^3 = g + 1. Every beginning

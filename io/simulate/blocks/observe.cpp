@@ -1,8 +1,8 @@
 // Finds the images that see a place.
+#include "io/simulate/blocks/observe.h"
+
 #include <algorithm>
 #include <cmath>
-
-#include "io/simulate/scene/scene.h"
 
 namespace megablock {
 

@@ -1,25 +1,14 @@
-// Gives the rotations of a panorama, and the cameras and points of the published simulations of a camera that turns
-// about a point (Cannelle 2013, 2.3.3).
+// Gives the rotations of a panorama, and the points of the published simulations of a camera that turns about a point
+// (Cannelle 2013, 2.3.3).
 #pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "geometry/camera/intrinsics.h"
+#include "io/simulate/scene/layout.h"
 
 namespace megablock {
-
-// The simulated cameras of the thesis, all of the model ign-radial. The table of the thesis prints b of the third
-// camera with a minus sign, and sy of the fourth as 3709. Neither agrees with the edge corrections in the same table,
-// so both are corrected here.
-struct PublishedCamera {
-  const char* name;
-  int width, height;  // px
-  Intrinsics truth;
-  double edge_px;  // published edge correction
-};
-const std::vector<PublishedCamera>& published_cameras();
 
 // Rotations ground -> camera that cover the sphere around the horizon in three rows, whose pitches differ by half of
 // the vertical field of view. The images of a row are evenly distributed over the circle. If they are too few to close
@@ -30,5 +19,7 @@ std::vector<Eigen::Quaterniond> panorama_rotations(double horizontal_rad, double
 // The vertices of an icosahedron that was subdivided `times` times: 10 * 4^times + 2 unit vectors.
 // Each division replaces a triangle by four, whose new corners are the middles of its edges, moved to the sphere.
 std::vector<Eigen::Vector3d> geodesic_sphere(int times);
+
+Layout make_panorama_layout(const SimulationOptions& options);
 
 }  // namespace megablock

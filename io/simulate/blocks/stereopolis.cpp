@@ -5,6 +5,8 @@
 // this until it has its number of frames. Every second drive goes in the opposite direction; the third and fourth (and
 // seventh, eighth, ...) drives have x and y exchanged. The second street along x may cross the second one along y on a
 // bridge.
+#include "io/simulate/blocks/stereopolis.h"
+
 #include <algorithm>
 #include <cmath>
 

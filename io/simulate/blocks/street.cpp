@@ -4,6 +4,8 @@
 // A place on the road at the arc length s of the drive lies kLane to the right of the street axis: (x, y) = p(s) +
 // (kLane + 0.1 n) right, with the rig kRigHeight above it. A frame deviates by normal errors of 10 cm across, 2 cm in
 // height, 0.5 degrees about the axes east and north, and 1 degree in heading.
+#include "io/simulate/blocks/street.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>

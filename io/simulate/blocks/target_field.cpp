@@ -1,6 +1,8 @@
 // Simulates a target field on which the rig of a vehicle is calibrated: an area between walls, with targets (the
 // control points) and tie points on walls and ground. The shapes of the paths are those of Cannelle (2013), 2.4; they
 // decide how well the rig is determined.
+#include "io/simulate/blocks/target_field.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>

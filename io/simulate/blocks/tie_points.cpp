@@ -10,12 +10,13 @@
 // number of observations and the index of each track. Last, all threads simulate the observations. Proposals draw from
 // the random stream of the frame, observations from that of the track, and the groups do not depend on the number of
 // threads. The block is therefore the same for any number of threads.
+#include "io/simulate/blocks/tie_points.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "geometry/threads/workers.h"
 #include "io/simulate/blocks/wrong_matches.h"
-#include "io/simulate/scene/scene.h"
 
 namespace megablock {
 

@@ -2,7 +2,7 @@
 // stereo pairs.
 #pragma once
 
-#include "io/simulate/scene/scene.h"
+#include "io/simulate/scene/layout.h"
 
 namespace megablock {
 

@@ -2,7 +2,7 @@
 // at random places.
 #pragma once
 
-#include "io/simulate/scene/scene.h"
+#include "io/simulate/blocks/observe.h"
 
 namespace megablock {
 

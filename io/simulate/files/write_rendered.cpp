@@ -17,6 +17,8 @@
 #include "io/project/inputs/control_file.h"
 #include "io/project/inputs/pose_csv.h"
 #include "io/project/project.h"
+#include "io/simulate/blocks/control.h"
+#include "io/simulate/blocks/simulate.h"
 #include "io/simulate/files/project_text.h"
 #include "io/simulate/images/image_file.h"
 #include "io/simulate/images/render.h"

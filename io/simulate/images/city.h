@@ -4,7 +4,7 @@
 #pragma once
 
 #include "io/simulate/images/texture.h"
-#include "io/simulate/scene/scene.h"
+#include "io/simulate/scene/layout.h"
 #include "io/simulate/scene/terrain.h"
 
 namespace megablock {

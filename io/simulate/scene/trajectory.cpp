@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "geometry/numbers/angles.h"
+#include "io/simulate/scene/relative_measurement.h"
 
 namespace megablock {
 

@@ -4,7 +4,8 @@
 // Internal to io/: it is not installed.
 #pragma once
 
-#include "io/simulate/scene/scene.h"
+#include "io/simulate/scene/simulated_block.h"
+#include "io/simulate/scene/simulation_options.h"
 
 namespace megablock {
 

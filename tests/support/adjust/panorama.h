@@ -7,6 +7,7 @@
 #include "adjust/calibration/panoramic.h"
 #include "geometry/camera/camera.h"
 #include "io/simulate/blocks/panorama.h"
+#include "io/simulate/scene/published_cameras.h"
 #include "io/simulate/scene/random.h"
 
 namespace megablock {

@@ -8,6 +8,7 @@
 #include "adjust/calibration/residual_structure.h"
 #include "io/base/error.h"
 #include "io/simulate/blocks/panorama.h"
+#include "io/simulate/scene/published_cameras.h"
 #include "io/simulate/blocks/simulate.h"
 #include "io/simulate/scene/random.h"
 

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "io/base/error.h"
+#include "io/simulate/blocks/simulate.h"
 #include "io/simulate/images/render.h"
 
 namespace megablock {
