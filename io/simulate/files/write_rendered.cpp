@@ -20,7 +20,7 @@
 #include "io/simulate/blocks/control.h"
 #include "io/simulate/blocks/simulate.h"
 #include "io/simulate/files/project_text.h"
-#include "io/simulate/images/image_file.h"
+#include "io/simulate/images/jpeg_writer.h"
 #include "io/simulate/images/render.h"
 #include "io/store/units/state_file.h"
 

@@ -1,4 +1,4 @@
-#include "io/simulate/images/image_file.h"
+#include "io/simulate/images/jpeg_writer.h"
 
 #include <algorithm>
 #include <chrono>
