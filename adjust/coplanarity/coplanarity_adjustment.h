@@ -18,27 +18,10 @@
 #include <string>
 #include <vector>
 
+#include "adjust/coplanarity/coplanarity_rank.h"
 #include "geometry/numbers/lsqr.h"
-#include "geometry/two_view/coplanarity.h"
 
 namespace megablock {
-
-// Cameras of one focal length (px) without distortion. Image coordinates are relative to the principal point.
-// Observations of point j are rows [begin[j], begin[j + 1]); the cameras of a point are distinct.
-struct CoplanarityNetwork {
-  double focal_px = 0;
-  std::vector<Eigen::Vector3d> centres;  // [cameras] ground frame, m
-  std::vector<XyzAngles> angles;         // [cameras]
-  std::vector<std::int64_t> begin{0};    // [points + 1]
-  std::vector<std::int32_t> camera;      // [observations]
-  std::vector<Eigen::Vector2d> image;    // [observations] px
-  // 1 = held. Empty: all free.
-  std::vector<std::uint8_t> angles_held;  // [3 x cameras]
-  std::vector<std::uint8_t> images_held;  // [2 x observations]
-
-  std::int64_t point_count() const { return static_cast<std::int64_t>(begin.size()) - 1; }
-  void check() const;  // throws InputError
-};
 
 // The method as published makes one step. Further steps bring F to zero without coming nearer to the truth. Without
 // forcing, LSQR finds the solution of least norm, in which radians and pixels count alike: 1e-6 rad costs nothing in
@@ -56,30 +39,6 @@ struct CoplanarityOptions {
   bool forced() const { return forcing_angles > 0 || forcing_images > 0; }
   void check() const;  // throws InputError
 };
-
-// The rank and the condition of the equations of the free angles and image coordinates. They are evaluated at rays that
-// were made to meet, because noise would raise the ranks. Points whose rays do not meet in front of their cameras are
-// left out.
-struct CoplanarityDiagnosis {
-  std::int64_t rows = 0, columns = 0, rank = 0;  // of (A B)
-  std::int64_t image_rank = 0;                   // of B
-  // Whether the cameras of every point that three or more see lie on one line (straight_line.h); false without such
-  // points.
-  bool collinear = false;
-  std::vector<double> angle_values;  // singular values of A (free angles), descending
-  std::int64_t nullity() const { return columns - rank; }
-  double angle_condition() const;  // infinite where A is singular; 1 without free angles
-};
-CoplanarityDiagnosis diagnose(const CoplanarityNetwork& network);
-
-// The singular values above zero of A, B and (A B), m px^2 per radian and per pixel, descending, for the free
-// parameters at the rays that meet. Their numbers are the ranks; their squares are the values that the report plots for
-// A'A, B'B and M'M. The computation is dense, for the scenes of the report: it takes seconds for 1 000 parameters, and
-// grows with the third power of their number.
-struct CoplanaritySpectrum {
-  std::vector<double> angles, images, both;
-};
-CoplanaritySpectrum spectrum(const CoplanarityNetwork& network);
 
 struct CoplanaritySolution {
   CoplanarityNetwork network;              // with corrected angles and image coordinates; held ones have the same bits

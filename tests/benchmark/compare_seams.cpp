@@ -15,6 +15,7 @@
 #include "adjust/tile/image_sigma.h"
 #include "geometry/numbers/chi_square.h"
 #include "io/simulate/scene/random.h"
+#include "merge/checks/seam_text.h"
 #include "tests/support/merge/turned_frames.h"
 
 namespace {

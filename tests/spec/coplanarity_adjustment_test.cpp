@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "adjust/coplanarity/coplanarity_network.h"
+#include "adjust/coplanarity/coplanarity_rank.h"
 #include "io/base/error.h"
 #include "known_positions_scene.h"
 #include "reached.h"

@@ -10,6 +10,7 @@
 #include "io/base/error.h"
 #include "io/simulate/streets/street_scene.h"
 #include "known_positions_scene.h"
+#include "merge/checks/seam_text.h"
 #include "merge/tree/tile_solver.h"
 #include "reached.h"
 #include "tests/support/adjust/single_tile.h"

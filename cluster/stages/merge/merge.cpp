@@ -28,6 +28,7 @@
 #include "io/base/hash.h"
 #include "io/store/job/events.h"
 #include "io/text/counted.h"
+#include "merge/checks/seam_text.h"
 #include "merge/tree/merge_tree_runner.h"
 
 namespace megablock {

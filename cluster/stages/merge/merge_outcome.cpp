@@ -15,6 +15,7 @@
 #include "cluster/stages/result/provenance.h"
 #include "io/base/error.h"
 #include "io/base/file_error.h"
+#include "merge/checks/seam_text.h"
 #include "merge/datum/gauge.h"
 #include "merge/tree/gather_by_tile.h"
 

@@ -9,7 +9,6 @@
 #include "io/block/held_priors.h"
 #include "io/project/inputs/pose_csv.h"
 #include "io/project/project_init.h"
-#include "io/project/project_sections.h"
 #include "io/simulate/blocks/simulate.h"
 #include "io/simulate/files/write.h"
 #include "io/store/units/block_file.h"
@@ -17,6 +16,7 @@
 #include "io/text/yaml_reader.h"
 #include "tests/support/io/image_files.h"
 #include "tests/support/io/image_names.h"
+#include "tests/support/io/project_text.h"
 #include "tests/support/io/scratch_directory.h"
 
 namespace megablock {
@@ -24,43 +24,19 @@ namespace {
 
 using fixture::gps_tags;
 using fixture::joined;
+using fixture::kDji;
 using fixture::message_of;
 using fixture::read_file;
+using fixture::read_text;
+using fixture::refusal;
 using fixture::Tags;
 using fixture::write_file;
 using fixture::write_image_file;
-using ::testing::Each;
+using fixture::write_line;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
-
-const Tags kDji = {{"Exif.Image.Make", "DJI"}, {"Exif.Image.Model", "FC300S"}, {"Exif.Photo.FocalLength", "361/100"}};
-
-// Five images on a line to the east, about 76 m apart, at 46.84 N 91.99 W, 250 m.
-void write_line(const ScratchDirectory& folder, int count = 5) {
-  for (int i = 0; i < count; ++i)
-    write_image_file(folder.path("images/" + std::to_string(i) + ".jpg"), 64, 48, i,
-                     joined(kDji, gps_tags(46.84, -91.99 + 0.001 * i, 250)));
-}
-
-// The sections of a program whose first three need images.
-const std::vector<SettingsSection> kSections = {
-    {"features", "", true}, {"candidates", "", true},  {"matching", "filter_model", true},
-    {"tiles", "", false},   {"adjustment", "", false}, {"merge", "", false}};
-
-Project read_text(const ScratchDirectory& folder, const std::string& text) {
-  write_file(folder.path("block.yaml"), text);
-  return read_project(folder.path("block.yaml"), kSections);
-}
-
-// The message without the path of the folder.
-std::string refusal(const ScratchDirectory& folder, const std::string& text) {
-  std::string message = message_of<InputError>([&] { read_text(folder, text); });
-  for (std::size_t at; (at = message.find(folder.path() + "/")) != std::string::npos;)
-    message.erase(at, folder.path().size() + 1);
-  return message;
-}
 
 FrameIndex frame(std::int64_t i) { return FrameIndex(i); }
 
@@ -224,61 +200,6 @@ TEST(Project, BadFilesAndCopiesAreLeftOut) {
   EXPECT_EQ(project.unreadable[0].first, "empty.jpg");
   EXPECT_EQ(project.unreadable[1].first, "text.jpg");
   EXPECT_THAT(project.warnings, ElementsAre("image '9_copy.jpg' is a copy of '1.jpg'; left out"));
-}
-
-// What the section of a camera does not say, the section of all cameras does.
-TEST(Project, ASectionOfACameraKeepsWhatDefaultCalibrates) {
-  ScratchDirectory folder;
-  write_line(folder, 1);
-  const auto sigmas = [&](const std::string& common, const std::string& own) {
-    return read_text(folder, "images: images\ncameras:\n  default: {" + common +
-                                 "}\n  DJI FC300S 64x48 3.61mm: {focal_px: 100" + own + "}\n")
-        .block.cameras[CameraIndex(0)]
-        .prior_sigma;
-  };
-  EXPECT_THAT(sigmas("calibrate: false", ""), Each(0.0));
-  EXPECT_EQ(sigmas("calibrate: [focal]", ""), (IntrinsicSigmas{5}));
-  EXPECT_EQ(sigmas("calibrate: false", ", calibrate: [focal]"), (IntrinsicSigmas{5}));
-  EXPECT_EQ(sigmas("calibrate: [k1]", ", model: pinhole, calibrate: [focal]"), (IntrinsicSigmas{5}));
-}
-
-TEST(Project, CameraSettingsOverrideTheHeaders) {
-  ScratchDirectory folder;
-  write_line(folder, 1);
-  write_image_file(folder.path("images/x.jpg"), 100, 80, 50);
-  write_image_file(folder.path("mask.png"), 64, 48, 0);
-  const Block block = read_text(folder,
-                                "images: images\n"
-                                "cameras:\n"
-                                "  default: {calibrate: false}\n"
-                                "  DJI FC300S 64x48 3.61mm:\n"
-                                "    focal_mm: 3.61\n"
-                                "    sensor_mm: 7.22\n"
-                                "    principal_point_px: [31.5, 24.25]\n"
-                                "    distortion: {k1: -0.1, p2: 1e-3}\n"
-                                "    calibrate: [focal, k1, principal_point]\n"
-                                "    mask: mask.png\n")
-                          .block;
-  const Camera& camera = block.cameras[CameraIndex(0)];
-  EXPECT_DOUBLE_EQ(camera.intrinsics[kFocal], 32);
-  EXPECT_EQ(camera.intrinsics[kPrincipalX], 31.5);
-  EXPECT_EQ(camera.intrinsics[kRadial1], -0.1);
-  EXPECT_EQ(camera.intrinsics[kDecentring2], 1e-3);
-  EXPECT_EQ(camera.prior_sigma, (IntrinsicSigmas{1.6, 1.28, 1.28, 0.2, 0, 0, 0, 0}));
-  EXPECT_EQ(camera.mask_path, folder.path("mask.png"));
-  EXPECT_THAT(block.cameras[CameraIndex(1)].prior_sigma, Each(0.0));
-}
-
-TEST(Project, MaskFolderIsReadByCameraName) {
-  ScratchDirectory folder;
-  write_line(folder, 1);
-  write_image_file(folder.path("masks/DJI FC300S 64x48 3.61mm.png"), 64, 48, 0);
-  write_image_file(folder.path("masks/other.png"), 64, 48, 0);
-  const Project project = read_text(folder, "images: images\nmasks: masks\n");
-  EXPECT_EQ(project.block.cameras[CameraIndex(0)].mask_path, folder.path("masks/DJI FC300S 64x48 3.61mm.png"));
-  EXPECT_THAT(project.warnings, ElementsAre(HasSubstr("other.png")));
-  write_image_file(folder.path("masks/DJI FC300S 64x48 3.61mm.png"), 32, 48, 0);
-  EXPECT_THAT(refusal(folder, "images: images\nmasks: masks\n"), HasSubstr("32 x 48"));
 }
 
 TEST(Project, StageSectionsKeepFileAndLine) {

@@ -8,6 +8,7 @@
 
 #include "adjust/tile/image_sigma.h"
 #include "adjust/tile/tile_adjustment.h"
+#include "merge/checks/seam_text.h"
 #include "tests/support/merge/tiled_block.h"
 #include "tests/support/merge/turned_frames.h"
 
