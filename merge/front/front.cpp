@@ -217,6 +217,12 @@ FrontFactor FrontFactor::read(ByteReader& in) {
   f.factor = in.values<double>();
   f.z = in.values<double>();
   f.held = in.values<std::int64_t>();
+  const auto e = static_cast<std::size_t>(total_dimension(f.eliminated));
+  const std::size_t n = e + static_cast<std::size_t>(total_dimension(f.separator));
+  if (f.right_hand_sides < 1 || f.factor.size() != n * e ||
+      f.z.size() != e * static_cast<std::size_t>(f.right_hand_sides) ||
+      std::ranges::any_of(f.held, [&](std::int64_t row) { return static_cast<std::size_t>(row) >= e; }))
+    throw StoreError("merge: a factor has the wrong size");
   return f;
 }
 

@@ -102,7 +102,7 @@ struct FrontFactor {
 
   std::int64_t byte_count() const;
   void write(ByteWriter& out) const;
-  static FrontFactor read(ByteReader& in);
+  static FrontFactor read(ByteReader& in);  // throws StoreError
 };
 
 // Values of a list of unknowns, such as a step of the adjustment. Frames and mounts have a rotation (radians) and a

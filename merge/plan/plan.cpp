@@ -107,13 +107,23 @@ void EliminationPlan::write(ByteWriter& out) const {
 }
 
 EliminationPlan EliminationPlan::read(ByteReader& in) {
+  constexpr std::size_t kNodeBytes = 7 * sizeof(std::int64_t);  // four numbers, and the lengths of three lists
   EliminationPlan plan;
-  plan.nodes.resize(in.value<std::uint64_t>());
+  plan.nodes.resize(in.count(kNodeBytes));
   for (PlanNode& node : plan.nodes) {
     for (std::int64_t* number : {&node.left, &node.right, &node.parent, &node.leaf}) *number = in.value<std::int64_t>();
     for (UnknownList* list : {&node.eliminated, &node.separator, &node.owned}) *list = in.values<Unknown>();
   }
   plan.node_of_leaf = in.values<std::int64_t>();
+  const auto none_or_within = [](std::int64_t number, const auto& table) {
+    return number >= -1 && number < std::ssize(table);
+  };
+  for (const PlanNode& node : plan.nodes)
+    if (!none_or_within(node.left, plan.nodes) || !none_or_within(node.right, plan.nodes) ||
+        !none_or_within(node.parent, plan.nodes) || !none_or_within(node.leaf, plan.node_of_leaf))
+      throw StoreError("merge: a plan names nodes that it has not");
+  for (const std::int64_t node : plan.node_of_leaf)
+    if (node < 0 || !none_or_within(node, plan.nodes)) throw StoreError("merge: a plan names nodes that it has not");
   return plan;
 }
 

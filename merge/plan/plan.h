@@ -32,7 +32,7 @@ struct EliminationPlan {
   std::vector<std::int64_t> node_of_leaf;  // [leaves]
   std::int64_t root() const { return static_cast<std::int64_t>(nodes.size()) - 1; }
   void write(ByteWriter& out) const;
-  static EliminationPlan read(ByteReader& in);
+  static EliminationPlan read(ByteReader& in);  // throws StoreError
 };
 
 // The cost of the inner nodes. The cost of the leaves is in their own plans.

@@ -80,6 +80,8 @@ class ByteReader {
     copy(b.data(), b.size());
     return b;
   }
+  // A number of elements that follow with at least `size` bytes each.
+  std::size_t count(std::size_t size) { return count_of(size); }
   bool at_end() const { return position_ == size_; }
 
  private:

@@ -221,12 +221,16 @@ void read_bytes(std::istream& file, std::size_t count, Take&& take) {
 
 void write_count(std::ostream& file, std::size_t count) { write(file, static_cast<std::uint64_t>(count)); }
 
-// Reads the number of values and makes room for them.
+// Reads the number of values, which must be `count`, and makes room for them.
 template <typename T>
-std::size_t read_count(std::istream& file, std::vector<T>& values) {
-  std::uint64_t count = 0;
-  if (read(file, count)) values.resize(count);
-  return file ? count : 0;
+bool read_count(std::istream& file, std::size_t count, std::vector<T>& values) {
+  std::uint64_t stored = 0;
+  if (!read(file, stored)) return false;
+  if (stored != count)
+    file.setstate(std::ios::failbit);
+  else
+    values.resize(count);
+  return !!file;
 }
 
 }  // namespace
@@ -248,8 +252,8 @@ void write_column(std::ostream& file, const std::vector<double>& values) {
   write(file, values.data() + pixels, count - pixels);
 }
 
-void read_column(std::istream& file, std::vector<double>& values) {
-  const std::size_t count = read_count(file, values);
+void read_column(std::istream& file, std::size_t count, std::vector<double>& values) {
+  if (!read_count(file, count, values)) return;
   double* out = values.data();
   Form form;
   if (!read(file, form)) return;
@@ -266,8 +270,8 @@ void write_column(std::ostream& file, const std::vector<std::uint8_t>& values) {
   write_bytes(file, values.size(), [&](std::size_t i) { return values[i]; });
 }
 
-void read_column(std::istream& file, std::vector<std::uint8_t>& values) {
-  const std::size_t count = read_count(file, values);
+void read_column(std::istream& file, std::size_t count, std::vector<std::uint8_t>& values) {
+  if (!read_count(file, count, values)) return;
   read_bytes(file, count, [out = values.data()](std::size_t i, std::uint8_t value) { out[i] = value; });
 }
 
@@ -276,8 +280,8 @@ void write_column(std::ostream& file, const std::vector<std::int64_t>& values) {
   write_steps(file, values.size(), [&](std::size_t i) { return values[i]; });
 }
 
-void read_column(std::istream& file, std::vector<std::int64_t>& values) {
-  const std::size_t count = read_count(file, values);
+void read_column(std::istream& file, std::size_t count, std::vector<std::int64_t>& values) {
+  if (!read_count(file, count, values)) return;
   read_steps(file, count, [out = values.data()](std::size_t i, std::int64_t value) { out[i] = value; });
 }
 
@@ -286,8 +290,8 @@ void write_column(std::ostream& file, const std::vector<LocalImage>& values) {
   write_integers(file, values.size(), [&](std::size_t i) { return std::int64_t{values[i].value}; });
 }
 
-void read_column(std::istream& file, std::vector<LocalImage>& values) {
-  const std::size_t count = read_count(file, values);
+void read_column(std::istream& file, std::size_t count, std::vector<LocalImage>& values) {
+  if (!read_count(file, count, values)) return;
   read_integers(file, count, [out = values.data()](std::size_t i, std::int64_t value) {
     out[i] = LocalImage(static_cast<std::int32_t>(value));
   });
@@ -299,8 +303,8 @@ void write_column(std::ostream& file, const std::vector<TilePoint>& values) {
   write_steps(file, values.size(), [&](std::size_t i) { return values[i].index; });
 }
 
-void read_column(std::istream& file, std::vector<TilePoint>& values) {
-  const std::size_t count = read_count(file, values);
+void read_column(std::istream& file, std::size_t count, std::vector<TilePoint>& values) {
+  if (!read_count(file, count, values)) return;
   TilePoint* out = values.data();
   read_bytes(file, count, [&](std::size_t i, std::uint8_t role) { out[i].role = static_cast<PointRole>(role); });
   read_steps(file, count, [&](std::size_t i, std::int64_t index) { out[i].index = index; });

@@ -9,7 +9,8 @@
 //   bytes      runs of equal values (flags), or unchanged
 //   others     unchanged: plain values, and positions of three doubles each
 //
-// The state of the file says whether everything was written, or read.
+// The state of the file says whether everything was written, or read. A reader knows how many values a column has: any
+// other number in the file marks damage, and takes no memory.
 // Internal to merge/: it is not installed.
 #pragma once
 
@@ -28,11 +29,11 @@ void write_column(std::ostream& file, const std::vector<std::int64_t>& values); 
 void write_column(std::ostream& file, const std::vector<LocalImage>& values);    // integers
 void write_column(std::ostream& file, const std::vector<TilePoint>& values);     // roles as bytes, indices as steps
 
-void read_column(std::istream& file, std::vector<double>& values);
-void read_column(std::istream& file, std::vector<std::uint8_t>& values);
-void read_column(std::istream& file, std::vector<std::int64_t>& values);
-void read_column(std::istream& file, std::vector<LocalImage>& values);
-void read_column(std::istream& file, std::vector<TilePoint>& values);
+void read_column(std::istream& file, std::size_t count, std::vector<double>& values);
+void read_column(std::istream& file, std::size_t count, std::vector<std::uint8_t>& values);
+void read_column(std::istream& file, std::size_t count, std::vector<std::int64_t>& values);
+void read_column(std::istream& file, std::size_t count, std::vector<LocalImage>& values);
+void read_column(std::istream& file, std::size_t count, std::vector<TilePoint>& values);
 
 template <typename T>
 void write_column(std::ostream& file, const std::vector<T>& values) {
@@ -42,9 +43,10 @@ void write_column(std::ostream& file, const std::vector<T>& values) {
 }
 
 template <typename T>
-void read_column(std::istream& file, std::vector<T>& values) {
-  std::uint64_t count = 0;
-  if (!file.read(reinterpret_cast<char*>(&count), sizeof count)) return;
+void read_column(std::istream& file, std::size_t count, std::vector<T>& values) {
+  std::uint64_t stored = 0;
+  if (!file.read(reinterpret_cast<char*>(&stored), sizeof stored)) return;
+  if (stored != count) return file.setstate(std::ios::failbit);
   values.resize(count);
   file.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(count * sizeof(T)));
 }

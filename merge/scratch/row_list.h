@@ -36,6 +36,8 @@ class RowList {
     list.distances_ = in.values<std::uint8_t>();
     list.last_ = in.value<std::int32_t>();
     list.size_ = in.value<std::int32_t>();
+    if (list.size_ < 0 || static_cast<std::size_t>(list.size_) > list.distances_.size())
+      throw StoreError("merge: a list of rows has the wrong size");
     return list;
   }
   std::vector<std::int32_t> rows() const {

@@ -82,6 +82,8 @@ void TileStore::add(RankTile tile) {
 bool TileStore::spill(Slot& slot) {
   const std::int64_t tile = slot.tile.tile;
   const std::string points = points_of(tile, slot.points_file);
+  slot.sizes.clear();
+  visit_tables([&](const auto& table) { slot.sizes.push_back(table.size()); }, slot.tile.problem);
   const auto write_tables = [&](std::ostream& file) {
     visit_tables([&](const auto& table) { write_column(file, table); }, slot.tile.problem);
   };
@@ -110,11 +112,13 @@ RankTile& TileStore::load(std::size_t row) {
   }
   const std::int64_t tile = slot.tile.tile;
   options_.scratch->read(measurements_of(tile), [&](std::istream& file, std::size_t) {
-    visit_tables([&](auto& table) { read_column(file, table); }, slot.tile.problem);
+    auto size = slot.sizes.begin();
+    visit_tables([&](auto& table) { read_column(file, *size++, table); }, slot.tile.problem);
   });
   if (!slot.points_here)
-    options_.scratch->read(points_of(tile, slot.points_file),
-                           [&](std::istream& file, std::size_t) { read_column(file, slot.tile.state.points); });
+    options_.scratch->read(points_of(tile, slot.points_file), [&](std::istream& file, std::size_t) {
+      read_column(file, slot.tile.problem.points.size(), slot.tile.state.points);
+    });
   loaded_ = static_cast<std::int64_t>(row);
   return slot.tile;
 }

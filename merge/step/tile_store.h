@@ -72,6 +72,7 @@ class TileStore {
     RankTile tile;
     TileState trial;
     bool in_scratch = false;
+    std::vector<std::size_t> sizes;  // of the tables in scratch, with which a damaged file is known
     // The points of a tile in scratch are in memory, because they did not fit there.
     bool points_here = false, trial_here = false;
     int points_file = 0;  // number of the file with the present points; the other of the two files holds the trial's

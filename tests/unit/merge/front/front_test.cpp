@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 #include <filesystem>
+#include <functional>
 #include <random>
 #include <sstream>
 
@@ -71,6 +72,40 @@ TEST(FrontTest, UpdateMatrixIsTheSchurComplementWithAndWithoutMemoryOfOthers) {
     std::size_t i = 0;
     for (Eigen::Index c = 0; c < 24; ++c)
       for (Eigen::Index r = c; r < 24; ++r) EXPECT_NEAR(result.update.matrix[i++], schur(r, c), 1e-11 * schur(c, c));
+  }
+}
+
+TEST(FrontTest, FactorsWithADamagedSizeAreRefused) {
+  FrontFactor whole;
+  whole.eliminated = frames(0, 2);
+  whole.separator = frames(2, 3);
+  whole.right_hand_sides = 2;
+  whole.factor.assign(18 * 12, 1);
+  whole.z.assign(12 * 2, 1);
+  whole.held = {0, 11};
+  const auto back = [](const FrontFactor& factor) {
+    ByteWriter out;
+    factor.write(out);
+    const Bytes bytes = out.take();
+    ByteReader in(bytes);
+    return FrontFactor::read(in);
+  };
+  EXPECT_EQ(back(whole).factor, whole.factor);
+  EXPECT_EQ(back(whole).held, whole.held);
+  EXPECT_NO_THROW(back({})) << "of a node without a front";
+  using Damage = std::function<void(FrontFactor&)>;
+  const std::vector<Damage> damages = {[](FrontFactor& f) { f.factor.pop_back(); },
+                                       [](FrontFactor& f) { f.z.push_back(0); },
+                                       [](FrontFactor& f) { f.held.back() = 12; },
+                                       [](FrontFactor& f) { f.held.back() = -1; },
+                                       [](FrontFactor& f) { f.right_hand_sides = -2; },
+                                       [](FrontFactor& f) { f.eliminated[1].dimension = 7; },
+                                       [](FrontFactor& f) { f.separator[0].dimension = std::int64_t{1} << 40; },
+                                       [](FrontFactor& f) { f.eliminated.pop_back(); }};
+  for (std::size_t d = 0; d < damages.size(); ++d) {
+    FrontFactor factor = whole;
+    damages[d](factor);
+    EXPECT_THROW(back(factor), StoreError) << d;
   }
 }
 

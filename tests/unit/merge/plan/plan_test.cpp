@@ -43,5 +43,44 @@ TEST(Plan, SidesOfANodeShareTheFramesOfSeparatorsOnly) {
   EXPECT_GT(shared, 50);
 }
 
+Bytes written_plan(const EliminationPlan& plan) {
+  ByteWriter out;
+  plan.write(out);
+  return out.take();
+}
+
+TEST(Plan, DamagedOnesAreRefused) {
+  EliminationPlan whole;
+  whole.nodes.resize(3);
+  for (std::size_t leaf = 0; leaf < 2; ++leaf) {
+    whole.nodes[leaf].parent = 2;
+    whole.nodes[leaf].leaf = static_cast<std::int64_t>(leaf);
+  }
+  whole.nodes[2].left = 0;
+  whole.nodes[2].right = 1;
+  whole.node_of_leaf = {0, 1};
+  const auto back = [](const Bytes& bytes) {
+    ByteReader in(bytes);
+    return EliminationPlan::read(in);
+  };
+  EXPECT_EQ(written_plan(back(written_plan(whole))), written_plan(whole));
+  for (const std::int64_t wrong : {std::int64_t{-2}, std::int64_t{3}, std::int64_t{1} << 60}) {
+    for (std::int64_t PlanNode::*number : {&PlanNode::left, &PlanNode::right, &PlanNode::parent, &PlanNode::leaf}) {
+      EliminationPlan plan = whole;
+      plan.nodes[1].*number = wrong;
+      EXPECT_THROW(back(written_plan(plan)), StoreError);
+    }
+    EliminationPlan plan = whole;
+    plan.node_of_leaf[1] = wrong;
+    EXPECT_THROW(back(written_plan(plan)), StoreError);
+  }
+  // Every byte of the sizes may be damaged: the number of nodes comes first.
+  for (std::size_t place = 0; place < sizeof(std::uint64_t); ++place) {
+    Bytes bytes = written_plan(whole);
+    bytes[place] = '\x7f';
+    EXPECT_THROW(back(bytes), StoreError) << place;
+  }
+}
+
 }  // namespace
 }  // namespace megablock

@@ -28,7 +28,7 @@ std::size_t packed(const std::vector<T>& values) {
   const std::string bytes = written(values);
   std::istringstream file(bytes + "next");
   std::vector<T> back(7);
-  read_column(file, back);
+  read_column(file, values.size(), back);
   EXPECT_TRUE(file);
   EXPECT_EQ(static_cast<std::size_t>(file.tellg()), bytes.size());
   EXPECT_EQ(back.size(), values.size());
@@ -116,7 +116,7 @@ TEST(PackedColumns, PointsInTheBytesOfTheirGaps) {
   write_column(file, points);
   EXPECT_LE(file.str().size(), 8 * points.size() + 200);
   std::vector<TilePoint> back;
-  read_column(file, back);
+  read_column(file, points.size(), back);
   ASSERT_EQ(back.size(), points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     EXPECT_EQ(back[i].role, points[i].role);
@@ -141,7 +141,7 @@ void expect_named_when_short(const std::vector<T>& values) {
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     std::istringstream file(bytes.substr(0, size));
     std::vector<T> back;
-    read_column(file, back);
+    read_column(file, values.size(), back);
     EXPECT_FALSE(file) << size << " of " << bytes.size() << " bytes";
   }
 }
@@ -165,7 +165,7 @@ void expect_refused(const std::vector<T>& values, std::size_t place, char byte) 
   bytes[place] = byte;
   std::istringstream file(bytes);
   std::vector<T> back;
-  read_column(file, back);
+  read_column(file, values.size(), back);
   EXPECT_FALSE(file) << place;
 }
 
@@ -179,6 +179,19 @@ TEST(PackedColumns, FormsThatAreNone) {
   expect_refused(std::vector<std::uint8_t>{1, 0, 1}, kForm, 7);
   expect_refused(std::vector<LocalImage>{LocalImage(3), LocalImage(70'000)}, kForm + 8, 3);  // bytes each
   expect_refused(std::vector<LocalImage>{LocalImage(3), LocalImage(70'000)}, kForm + 8, 16);
+}
+
+// A count that is damaged asks for no memory: the last byte of one is 2^56 values.
+TEST(PackedColumns, CountsOfAnotherColumn) {
+  for (const std::size_t place : {0, 7}) {
+    expect_refused(std::vector<double>(100, 0.1), place, 1);
+    expect_refused(std::vector<double>{0.1, 0.2}, place, 1);
+    expect_refused(std::vector<std::uint8_t>(100, 1), place, 1);
+    expect_refused(std::vector<std::int64_t>{7, 7, 7}, place, 1);
+    expect_refused(std::vector<LocalImage>(5, LocalImage(3)), place, 1);
+    expect_refused(std::vector<TilePoint>(3), place, 1);
+    expect_refused(std::vector<Eigen::Vector3d>(3, Eigen::Vector3d::Zero()), place, 1);
+  }
 }
 
 }  // namespace

@@ -23,6 +23,19 @@ TEST(RowList, GivesBackWhatWentIn) {
   }
 }
 
+TEST(RowList, RefusesADamagedSize) {
+  RowList list;
+  for (const std::int32_t row : {3, 4, 900}) list.push_back(row);
+  for (const std::int32_t size : {-1, 1 << 30}) {
+    ByteWriter out;
+    list.write(out);
+    Bytes bytes = out.take();
+    std::memcpy(bytes.data() + bytes.size() - sizeof size, &size, sizeof size);
+    ByteReader in(bytes);
+    EXPECT_THROW(RowList::read(in), StoreError) << size;
+  }
+}
+
 // The distances at which a byte more begins, the first row's from before the table included.
 TEST(RowList, EveryDistance) {
   for (std::int32_t distance = 1; distance < 2000; ++distance) {

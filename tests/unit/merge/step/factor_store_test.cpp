@@ -18,7 +18,10 @@ class FactorStoreTest : public testing::Test {
 
 NodeFactors factors_of_size(std::size_t values) {
   NodeFactors factors;
+  factors.front.eliminated = {{{UnknownKind::kFrame, 0, 0}, 1}};
+  factors.front.separator = {{{UnknownKind::kFrame, 0, 1}, static_cast<std::int64_t>(values) - 1}};
   factors.front.factor.assign(values, 1.5);
+  factors.front.z.assign(1, 0.5);
   return factors;
 }
 

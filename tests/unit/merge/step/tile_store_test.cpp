@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "tests/support/io/scratch_directory.h"
 #include "tests/support/merge/damaged_scratch.h"
@@ -214,6 +215,17 @@ TEST_F(TileStoreTest, NamesAFileThatIsDamaged) {
   const std::string file = scratch_.path("rank-0/tile-4-measurements.bin");
   std::filesystem::resize_file(file, 100);
   expect_named([&] { store.whole(4); }, file);
+}
+
+// With a number of values that no memory can hold.
+TEST_F(TileStoreTest, NamesAFileWithADamagedSize) {
+  for (const std::string name : {"tile-4-measurements.bin", "tile-4-points-0.bin"}) {
+    TileStore store(options());
+    fill(store);
+    const std::string file = scratch_.path("rank-0/" + name);
+    std::fstream(file, std::ios::binary | std::ios::in | std::ios::out).seekp(7).put('\x40');
+    expect_named([&] { store.whole(4); }, file);
+  }
 }
 
 TEST_F(TileStoreTest, LeavesNoFiles) {
