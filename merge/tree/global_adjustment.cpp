@@ -52,14 +52,14 @@ bool negligible(const GlobalState& state, const GlobalOptions& options, double c
 }
 
 // Starts the next iteration after an accepted or rejected step, or stops. Where several reasons apply, the last one
-// below counts.
+// below counts: what converges with its last permitted step has converged.
 void start_sweep(GlobalState& state, const GlobalOptions& options) {
   state.sweep_lambda = state.lambda;
   state.sweep_curvature = state.curvature;
   state.next = GlobalAction::kUp;
+  if (state.iterations >= options.max_iterations) stop(state, GlobalOutcome::kIterationLimit);
   if (negligible(state, options, state.cost - state.trial_cost)) stop(state, GlobalOutcome::kConverged);
   if (state.lambda > kMaxLambda) stop(state, GlobalOutcome::kFailed);
-  if (state.iterations >= options.max_iterations) stop(state, GlobalOutcome::kIterationLimit);
 }
 
 }  // namespace
@@ -159,8 +159,8 @@ std::string describe(const GlobalState& state) {
                                               "failed: no step decreases the cost"};
   char line[200];
   std::snprintf(line, sizeof line, "global adjustment %s after %s (%d accepted): cost %.6g -> %.6g, decrement %.2e",
-                kOutcomes[static_cast<int>(state.outcome)], counted(state.iterations, "iteration").c_str(), state.accepted,
-                state.initial_cost, state.cost, std::sqrt(state.decrement_squared));
+                kOutcomes[static_cast<int>(state.outcome)], counted(state.iterations, "iteration").c_str(),
+                state.accepted, state.initial_cost, state.cost, std::sqrt(state.decrement_squared));
   return line;
 }
 

@@ -348,6 +348,29 @@ TEST(GlobalController, StopsUnconfirmedWhereItIsHardlyDamped) {
   EXPECT_EQ(state.outcome, GlobalOutcome::kConverged);
 }
 
+// The last permitted step decides like any other whether it was negligible.
+TEST(GlobalController, ConvergesWithItsLastStep) {
+  GlobalOptions options;
+  options.function_tolerance = 1e-3;
+  options.max_iterations = 2;
+  const auto outcome_after = [&](double last_cost) {
+    GlobalState state = start_global(options);
+    for (const auto& [cost, trial_cost] : {std::pair(200.0, 100.0), std::pair(100.0, last_cost)}) {
+      UpReport up;
+      up.sums.cost = cost;
+      up.sums.decrement_squared = cost;
+      report_up(state, options, up);
+      report_down(state, options, {0.0, trial_cost});
+      EXPECT_EQ(state.next, GlobalAction::kAccept);
+      report_accepted(state, options);
+    }
+    EXPECT_EQ(state.next, GlobalAction::kStop);
+    return state.outcome;
+  };
+  EXPECT_EQ(outcome_after(99.99), GlobalOutcome::kConverged);
+  EXPECT_EQ(outcome_after(60), GlobalOutcome::kIterationLimit);
+}
+
 TEST(GlobalController, RefusesBadOptions) {
   GlobalOptions options;
   options.max_decrement = 0;
