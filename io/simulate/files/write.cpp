@@ -45,7 +45,11 @@ void write_simulated_block(const SimulationOptions& options, const std::string& 
   truth_tracks.group("points", "one row per track of tie_points.h5");
   truth_tracks.growing<double>(kPosition, {3}, {"m", "true position in the ground frame"});
   truth_tracks.group("observations", "one row per observation of tie_points.h5");
-  truth_tracks.growing<std::uint8_t>(kOutlier, {}, {"", "1: a wrong match, 0: the point with the stated noise"});
+  truth_tracks.growing<std::uint8_t>(
+      kOutlier, {},
+      {"",
+       "0: the point with the stated noise, 1: anywhere in the image, 2: another place of a repeated facade, "
+       "3: on a moving vehicle"});
   const SimulatedBlock simulated = simulate_block(
       options,
       [&](const SimulatedTracks& batch) {

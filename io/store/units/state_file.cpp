@@ -66,7 +66,9 @@ void write_orientation(const std::string& path, const InitialOrientation& orient
     file.vector("verticals_aside/verdict",
                 column(orientation.verticals_aside,
                        [](const SetAsideVertical& v) { return static_cast<std::uint8_t>(v.verdict); }),
-                {"", "1 contradicted by most others, 2 without consensus, 3 against positions or attitudes"});
+                {"",
+                 "1 contradicted by most others, 2 without consensus, 3 against positions or attitudes, 4 against "
+                 "given poses"});
   }
   file.close();
 }
