@@ -6,13 +6,17 @@
 
 #include <span>
 
+#include "io/text/plausible.h"
+
 namespace megablock {
 
 struct FrameMeasurementType {
   const char* key;           // in the project file: names the CSV file; in the block's file: the group
   const char* value_column;  // of the CSV file, with its unit
   const char* sigma_column;
-  bool positive;  // a value of zero or less is refused, as for lengths; false for signed values
+  // What a number may be: beyond, it is a typing error or in another unit.
+  Limits values, sigmas;
+  Limits sigma_shares;  // of a sigma in the size of its value
 };
 std::span<const FrameMeasurementType> frame_measurement_types();
 

@@ -15,8 +15,8 @@
 namespace megablock {
 
 // Adds the measurements to the block. Lines that name an image of `left_out` are not used and give a warning. Throws
-// InputError with file:line for unknown names, for two names of the same frame, and for values and sigmas that are not
-// positive.
+// InputError with file:line for unknown names, for two names of the same frame, for a pair of frames that is measured
+// twice, and for numbers beyond the limits of the type.
 void read_frame_measurements(const FrameMeasurementType& type, const std::string& path,
                              const std::vector<std::string>& left_out, Block& block,
                              std::vector<std::string>& warnings);
