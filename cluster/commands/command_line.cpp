@@ -183,8 +183,8 @@ void add_status(CLI::App& app, Action& action) {
 std::vector<StageFiles> files_of_stages() {
   std::vector<StageFiles> files;
   for (const Stage& stage : all_stages())
-    if (stage.kind != nullptr)
-      files.push_back({stage.kind, stage.read_file, stage.makes_file_by_tile() ? stage.folder() : ""});
+    files.push_back({stage.kind == nullptr ? "" : stage.kind, stage.read_file,
+                     stage.makes_file_by_tile() ? stage.folder() : "", stage.folder(), stage.ending(), stage.check});
   return files;
 }
 

@@ -1,6 +1,7 @@
 #include "cluster/job/stage.h"
 
 #include <algorithm>
+#include <filesystem>
 
 namespace megablock {
 
@@ -10,7 +11,9 @@ std::string Stage::folder() const {
   return end == std::string::npos ? "" : file.substr(0, end);
 }
 
-bool Stage::makes_file_by_tile() const { return std::string(makes).ends_with("/<tile>.h5"); }
+std::string Stage::ending() const { return std::filesystem::path(makes).extension(); }
+
+bool Stage::makes_file_by_tile() const { return std::string(makes).find("/<tile>.") != std::string::npos; }
 
 const Stage* find_stage(const std::string& name) {
   const auto found = std::ranges::find_if(all_stages(), [&](const Stage& stage) { return stage.name == name; });

@@ -16,6 +16,7 @@
 
 namespace megablock {
 
+class JobStore;
 struct Job;
 struct JobRecord;     // cluster/job/job_record.h
 struct StageResults;  // cluster/stages/stages.h
@@ -35,6 +36,7 @@ struct Stage {
   std::array<const OptionSection*, 2> sections = {};     // of the project file; nullptr: none
   const char* kind = nullptr;                            // of its HDF5 files; nullptr: `check` only verifies them
   void (*read_file)(const std::string& path) = nullptr;  // reads a file of this kind; throws what is wrong with it
+  void (*check)(const JobStore& store) = nullptr;        // throws what is wrong with its files that have no seal
   void (*run)(const Stage& stage, const Job& job, JobRecord& record,
               StageResults& results) = nullptr;  // collective; throws alike on every rank
 
@@ -45,6 +47,7 @@ struct Stage {
     return !last.empty() && runs(given_tie_points) && last == (given_tie_points ? command_given : command);
   }
   std::string folder() const;  // of its files: "tracks"; empty: it has no folder for them alone
+  std::string ending() const;  // of their names: ".h5"
   bool makes_file_by_tile() const;
 };
 

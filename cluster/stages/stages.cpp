@@ -142,6 +142,7 @@ constexpr Stage kStages[] = {
      .command_given = "match",
      .help = "Run as far as matches, tiles, tracks and their coverage",
      .sections = {&kCoverageSection},
+     .check = check_coverage,
      .run = coverage},
     {.name = "orientation",
      .needs = "features, matching, where poses are not given",

@@ -40,16 +40,18 @@ class Check {
     attempt([&] { check_text(); });
     for (const std::string& name : units()) attempt([&] { check_unit(name); });
     attempt([&] { check_tile_files(); });
+    for (const StageFiles& stage : stages_)
+      if (stage.check) attempt([&] { stage.check(store_); });
     return std::move(problems_);
   }
 
  private:
-  // Runs an action. An error that it throws becomes one problem of the list.
+  // Runs an action. An error that it throws becomes one problem of the list, unless the list has it.
   void attempt(const std::function<void()>& action) {
     try {
       action();
     } catch (const Error& error) {
-      problems_.emplace_back(error.what());
+      if (std::ranges::find(problems_, error.what()) == problems_.end()) problems_.emplace_back(error.what());
     }
   }
 
@@ -78,7 +80,16 @@ class Check {
     return names;
   }
 
+  // Files that a user has put into the folder of a stage.
+  bool is_foreign(const std::string& name) const {
+    const std::string folder = name.substr(0, name.find('/'));
+    const auto stage = std::ranges::find(stages_, folder, &StageFiles::folder);
+    return stage != stages_.end() && folder != name && !name.ends_with(stage->ending) && name != kTrackList &&
+           !store_.seal(name);
+  }
+
   void check_unit(const std::string& name) {
+    if (is_foreign(name)) throw StoreError(store_.path(name) + ": is no file of a job; move it away");
     const std::string path = store_.verified_path(name);
     if (!name.ends_with(".h5")) return;  // only its stage can read its contents
     const std::string kind = file_kind(path);
@@ -120,7 +131,7 @@ class Check {
       if (folder.empty()) continue;
       const std::vector<std::string> names = store_.list(folder);
       std::int64_t found = 0;
-      for (const std::string& name : names) found += name.ends_with(".h5");
+      for (const std::string& name : names) found += name.ends_with(stage.ending);
       if (found > 0 && found < tiles)
         problems_.push_back(store_.path(folder) + ": has files of " + std::to_string(found) + " of " +
                             std::to_string(tiles) + " tiles; run the job again to complete it");

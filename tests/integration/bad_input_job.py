@@ -72,6 +72,25 @@ class BadInputJob(CopyOfTheBlock):
         self.assertEqual(done.returncode, FAILED_UNITS)
         self.assertRegex(done.stdout, "matches/000000.h5: is damaged .*; run the job again, which computes it anew")
 
+    def test_a_folder_in_place_of_the_coverage(self):
+        shutil.copytree(work / "clean_job", self.job)
+        table = self.job / "result/coverage.csv"
+        whole = table.read_text()
+        table.write_text("\n".join(whole.splitlines()[:-1]) + "\n")
+        (self.job / "coverage/mine.csv").write_text("mine")
+        said = subprocess.run([MEGABLOCK, "check", self.job], capture_output=True, text=True)
+        self.assertEqual(said.returncode, FAILED_UNITS)
+        self.assertRegex(said.stdout, "result/coverage.csv: has rows of [0-9]+ of [0-9]+ images; delete it and run")
+        self.assertRegex(said.stdout, "coverage/mine.csv: is no file of a job; move it away")
+        (self.job / "coverage/mine.csv").unlink()
+        table.unlink()
+        table.mkdir()
+        self.assertRegex(one_line(self.run_job(expect=BAD_INPUT)), "result/coverage.csv: cannot be written: a directory is where")
+        table.rmdir()
+        self.run_job()
+        self.assertEqual(table.read_text(), whole)
+        self.assertIn("whole", megablock("check", self.job))
+
     def test_figures_of_another_result_are_not_believed(self):
         shutil.copytree(work / "clean_job", self.job)
         figures, written = self.job / "result/figures.json", status(self.job)

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <cerrno>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 
@@ -13,11 +15,13 @@
 #include "cluster/mpi/collective.h"
 #include "cluster/process/process_memory.h"
 #include "io/base/error.h"
+#include "io/base/file_error.h"
 #include "io/base/hash.h"
 #include "io/store/units/block_file.h"
 #include "io/store/units/tracks_file.h"
 #include "io/text/csv_row.h"
 #include "io/text/plausible.h"
+#include "io/text/settings_reader.h"
 
 namespace megablock {
 
@@ -25,6 +29,7 @@ namespace {
 
 constexpr int kGrid = 4;  // cells of an image in each direction
 constexpr const char *kTable = "result/coverage.csv", *kMinShare = "coverage.min_share";
+constexpr const char* kHeader = "image,observations,covered_share,images_per_point";
 
 using Coverages = IndexedVector<ImageIndex, ImageCoverage>;
 
@@ -67,7 +72,7 @@ Coverages read_units(const Job& job, const std::vector<Unit>& units) {
 }
 
 std::string table_of(const Coverages& coverage, const NameTable<ImageIndex>& names) {
-  std::string csv = "image,observations,covered_share,images_per_point\n";
+  std::string csv = std::string(kHeader) + '\n';
   for (ImageIndex i(0); coverage.contains(i); ++i.value) {
     const ImageCoverage& c = coverage[i];
     const auto count = static_cast<double>(std::max<std::int64_t>(c.observations, 1));
@@ -79,6 +84,7 @@ std::string table_of(const Coverages& coverage, const NameTable<ImageIndex>& nam
 
 // A table that says the same stays as it is.
 void write_table(const JobStore& store, const std::string& csv) {
+  if (std::filesystem::is_directory(store.path(kTable))) throw_file_error(store.path(kTable), "written", EISDIR);
   std::ifstream in(store.path(kTable));
   if (std::string(std::istreambuf_iterator<char>(in), {}) != csv) store.write_text(kTable, csv);
 }
@@ -127,6 +133,33 @@ std::string coverage_note(const Coverages& coverage, const NameTable<ImageIndex>
   if (poor > kNamed) named += fmt::format(" and {} more", poor - kNamed);
   return fmt::format("{} of {} images {} tie points in less than {:.0f} % of their area: {}; all images are in {}",
                      poor, seen, poor == 1 ? "has" : "have", 100 * min_share, named, kTable);
+}
+
+// Row by row, because the table is as long as the block has images.
+void check_coverage(const JobStore& store) {
+  const std::string path = store.path(kTable), remedy = "; delete it and run the job again, which writes it anew";
+  const std::vector<std::string> columns = csv_fields(kHeader);
+  if (store.list("coverage").empty()) return;
+  if (!std::filesystem::exists(path)) throw StoreError(path + ": is missing; run the job again, which writes it");
+  std::ifstream file = open_input(path);
+  std::string row;
+  std::int64_t lines = 0;
+  const NameTable<ImageIndex> names = read_image_names(store.verified_path("block.h5"));
+  if (!read_csv_row(file, path, row, lines) || csv_fields(row) != columns)
+    throw StoreError(path + ":1: the header is not '" + kHeader + "'" + remedy);
+  ImageIndex image(0);
+  for (std::int64_t line = 2; read_csv_row(file, path, row, lines); line = lines + 1, ++image.value) {
+    const std::string where = path + ":" + std::to_string(line);
+    const std::vector<std::string> fields = csv_fields(row);
+    if (fields.size() != columns.size() || image.value >= std::ssize(names) || fields[0] != names[image])
+      throw StoreError(where + ": is not the row of the block's image " + std::to_string(image.value) + remedy);
+    for (std::size_t f = 1; f < fields.size(); ++f)
+      if (!(parse_number(fields[f], columns[f], where) >= 0))
+        throw StoreError(where + ": " + columns[f] + " must not be negative" + remedy);
+  }
+  if (image.value < std::ssize(names))
+    throw StoreError(path + ": has rows of " + std::to_string(image.value) + " of " + std::to_string(names.size()) +
+                     " images" + remedy);
 }
 
 void run_coverage(const Stage& stage, const Job& job, JobRecord& record, const std::vector<std::string>& tracks) {

@@ -37,6 +37,10 @@ std::map<ImageIndex, ImageCoverage> coverage_of(const TrackSet& tracks, const Bl
 std::string coverage_note(const IndexedVector<ImageIndex, ImageCoverage>& coverage, const NameTable<ImageIndex>& names,
                           double min_share);
 
+// Throws StoreError or InputError where the job has coverage of its tiles, but its table is missing, is no table, or is
+// not that of the images of the block.
+void check_coverage(const JobStore& store);
+
 // Collective. `tracks`: units by tile.
 void run_coverage(const Stage& stage, const Job& job, JobRecord& record, const std::vector<std::string>& tracks);
 

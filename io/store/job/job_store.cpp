@@ -79,7 +79,8 @@ std::optional<Trailer> read_trailer(int file, std::string& problem) {
   const std::int64_t size = file_size(file);
   Trailer trailer;
   if (size < static_cast<std::int64_t>(sizeof trailer)) {
-    problem = "is truncated (" + std::to_string(std::max<std::int64_t>(size, 0)) + " bytes)";
+    problem = "has no valid seal: with " + std::to_string(std::max<std::int64_t>(size, 0)) +
+              " bytes it is truncated, or no unit of a job";
   } else if (!read_fully(file, &trailer, sizeof trailer, size - static_cast<std::int64_t>(sizeof trailer))) {
     problem = "cannot be read";
   } else if (trailer.magic != kMagic || trailer.hash() != trailer.own_hash) {

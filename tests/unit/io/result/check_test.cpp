@@ -28,7 +28,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 const std::vector<StageFiles> kStages = {
-    {"features", [](const std::string& path) { read_features(path); }, ""},
+    {"features", [](const std::string& path) { read_features(path); }, "", "features"},
     {"candidates", [](const std::string& path) { read_candidates(path); }, ""},
     {"matches", [](const std::string& path) { read_matches(path); }, ""},
     {"tiles", [](const std::string& path) { read_tiles(path); }, ""},
@@ -108,6 +108,26 @@ TEST_F(CheckJob, ResultWhoseDigestIsNotItsOwnIsNamed) {
   result.state.cameras[CameraIndex(0)][kFocal] += 1;
   put("result/block.h5", [&](const std::string& path) { write_result(path, result); });
   EXPECT_THAT(problems(), ElementsAre(HasSubstr(": its digest is ")));
+}
+
+TEST_F(CheckJob, FileThatNoStageMadeIsNamedAsThat) {
+  std::filesystem::create_directories(store_.path("features/mine"));
+  for (const std::string name : {"features/notes.txt", "features/mine/photo.jpg"}) {
+    std::ofstream(store_.path(name)) << "mine";
+    EXPECT_THAT(problems(), ElementsAre(store_.path(name) + ": is no file of a job; move it away"));
+    store_.remove(name);
+  }
+  std::ofstream(store_.path("features/000001.h5")) << "cut";
+  EXPECT_THAT(problems(),
+              ElementsAre(HasSubstr("has no valid seal: with 3 bytes it is truncated, or no unit of a job")));
+}
+
+TEST_F(CheckJob, FilesWithoutASealAreCheckedByTheirStage) {
+  std::vector<StageFiles> stages = kStages;
+  stages.back().check = [](const JobStore& store) {
+    throw StoreError(store.path("result/table.csv") + ": is no table");
+  };
+  EXPECT_THAT(check_job(store_, stages), ElementsAre(HasSubstr("result/table.csv: is no table")));
 }
 
 TEST_F(CheckJob, BadJobFileIsNamed) {

@@ -3,12 +3,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <tuple>
 #include <vector>
 
 #include "cluster/job/job_options.h"
 #include "io/base/error.h"
+#include "io/store/units/block_file.h"
+#include "io/text/csv_row.h"
+#include "tests/support/io/image_files.h"
+#include "tests/support/io/scratch_directory.h"
+#include "tests/support/io/small_result.h"
 
 namespace megablock {
 namespace {
@@ -79,6 +86,41 @@ TEST(Coverage, TheNoteNamesImagesBelowTheShareThatHaveTiePoints) {
               testing::AllOf(HasSubstr("1 of 2 images has tie points in less than 25 % of their area: a.jpg;"),
                              Not(HasSubstr("b.jpg")), Not(HasSubstr("c.jpg"))));
   EXPECT_EQ(coverage_note(coverage, block.image_names, 0.1), "");
+}
+
+TEST(Coverage, TheCheckNamesWhatIsWrongWithTheTable) {
+  ScratchDirectory folder;
+  const JobStore store(folder.path("job"));
+  store.create();
+  Block block = three_images();
+  fixture::name_oddly(block);
+  store.write("block.h5", 1, [&](const std::string& path) { write_block(path, block); });
+  const auto problem = [&] { return fixture::message_of<Error>([&] { check_coverage(store); }); };
+  EXPECT_EQ(problem(), "") << "no coverage yet";
+  store.write("coverage/000000.txt", 1, [](const std::string& path) { std::ofstream(path) << "0 2 5 1\n"; });
+  EXPECT_THAT(problem(), HasSubstr("result/coverage.csv: is missing; run the job again"));
+
+  const std::string header = "image,observations,covered_share,images_per_point\n";
+  const auto row = [&](int image, const std::string& numbers) {
+    return csv_field(block.name_of(ImageIndex(image))) + "," + numbers + "\n";
+  };
+  const std::string two = header + row(0, "9,0.25,3.50") + row(1, "0,0.0000,0.00"), whole = two + row(2, "1,0.5,2");
+  const auto problem_of = [&](const std::string& text) {
+    store.write_text("result/coverage.csv", text);
+    return problem();
+  };
+  EXPECT_EQ(problem_of(whole), "");
+  EXPECT_THAT(problem_of(""), HasSubstr("coverage.csv:1: the header is not 'image,"));
+  EXPECT_THAT(problem_of(two), HasSubstr("coverage.csv: has rows of 2 of 3 images; delete it and run the job again"));
+  EXPECT_THAT(problem_of(two + row(1, "1,0.5,2")), HasSubstr("coverage.csv:6: is not the row of the block's image 2"));
+  EXPECT_THAT(problem_of(whole + row(2, "1,0.5,2")),
+              HasSubstr("coverage.csv:8: is not the row of the block's image 3"));
+  EXPECT_THAT(problem_of(two + row(2, "1,0.5")), HasSubstr("coverage.csv:6: is not the row"));
+  EXPECT_THAT(problem_of(two + row(2, "1,half,2")), HasSubstr("coverage.csv:6: covered_share: 'half' is not a"));
+  EXPECT_THAT(problem_of(two + row(2, "-1,0.5,2")), HasSubstr("coverage.csv:6: observations must not be negative"));
+  store.remove("result/coverage.csv");
+  std::filesystem::create_directory(store.path("result/coverage.csv"));
+  EXPECT_THAT(problem(), HasSubstr("coverage.csv: cannot be read: a directory is where a file is needed"));
 }
 
 TEST(Coverage, ItsOptionIsReadFromTheProjectFile) {
