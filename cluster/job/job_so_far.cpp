@@ -16,7 +16,7 @@ namespace {
 
 // The orientation of the last generation, if it was made from the present block.
 std::optional<BlockState> oriented_state(const JobStore& store, const Block& block) {
-  std::vector<std::string> units = store.list(find_stage("orientation")->folder());
+  std::vector<std::string> units = store.list(find_stage(kOrientationStage)->folder());
   std::sort(units.begin(), units.end());
   if (units.empty()) return std::nullopt;
   BlockState state = read_orientation(store.verified_path(units.back())).state;
@@ -37,7 +37,7 @@ JobSoFar read_job_so_far(const JobStore& store) {
 }
 
 void visit_tracks(const JobStore& store, const std::function<void(TrackSet&&)>& take) {
-  std::vector<std::string> units = store.list(find_stage("tracks")->folder());
+  std::vector<std::string> units = store.list(find_stage(kTrackStage)->folder());
   std::sort(units.begin(), units.end());
   for (const std::string& unit : units)
     if (unit.ends_with(".h5")) take(read_tracks(store.verified_path(unit)));

@@ -5,6 +5,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "cluster/job/stage.h"
 #include "cluster/stages/result/provenance.h"
 
 namespace megablock {
@@ -55,7 +56,7 @@ void list_failures(const JobRecord& record, const std::map<FrameIndex, std::stri
     if (told.contains(name)) continue;
     const auto reason = not_oriented.find(frame);
     const bool linked = result.tiles.tile_of_frame.contains(frame) && result.tiles.tile_of_frame[frame].valid();
-    result.failures.push_back({linked ? "orientation" : "matching", name,
+    result.failures.push_back({linked ? kOrientationStage : kMatchingStage, name,
                                linked && reason != not_oriented.end() ? reason->second
                                : linked ? "oriented at first, but too few of its observations hold in the adjustment"
                                         : "no other image shares enough verified matches with it"});

@@ -11,6 +11,7 @@
 
 #include "adjust/tile/image_sigma.h"
 #include "cluster/job/messages.h"
+#include "cluster/job/stage.h"
 #include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/outcome/diagnostics.h"
@@ -96,7 +97,7 @@ void say_iteration(const Job& job, const GlobalState& state, const GlobalOptions
   std::string line = describe(state);
   if (state.outcome == GlobalOutcome::kConverged && options.max_decrement > job.settings.merge.decrement)
     line += fmt::format(" (limit {:.1e} before the last screening)", options.max_decrement);
-  say(job, "merge", line);
+  say(job, kMergeStage, line);
 }
 
 // Loads this rank's tiles from their own adjustments, or from the checkpoint that was found. Returns the state of the
@@ -218,12 +219,12 @@ std::string shortfall(const Adjusted& adjusted, const MergeSettings& settings) {
 }
 
 void add_shortfall(const Job& job, JobRecord& record, const std::string& reason) {
-  if (!reason.empty()) add_failures(job, record, {{"merge", kResult, reason}});
+  if (!reason.empty()) add_failures(job, record, {{kMergeStage, kResult, reason}});
 }
 
 std::string shortfall_before(const Job& job) {
   return on_first_rank(job.ranks, [&] {
-    const auto record = read_record(job.store, "merge");
+    const auto record = read_record(job.store, kMergeStage);
     return record && !record->failures.empty() ? record->failures.front().reason : std::string();
   });
 }
@@ -244,22 +245,22 @@ void write_final(const Job& job, JobRecord& record, JobBlock& own, const MergeIn
                  const std::vector<TilePart>& parts, UnitEvent& event) {
   if (!reason.empty()) {
     record.notes.push_back(reason);
-    warn(job, "merge", reason);
+    warn(job, kMergeStage, reason);
   }
   const std::size_t notes_before = record.notes.size();
   for (const SeamCheck& seam : outcome.seams)
-    if (!seam.note.empty()) add_note(job, record, "merge", seam.note);
+    if (!seam.note.empty()) add_note(job, record, kMergeStage, seam.note);
   for (const std::string& line : describe_disagreements(adjusted.posterior.tile_checks, names_of(job.block)))
-    add_note(job, record, "merge", line);
+    add_note(job, record, kMergeStage, line);
   event.figures["seam_alarms"] = static_cast<double>(record.notes.size() - notes_before);
-  for (const std::string& line : judge_kept(parts)) add_note(job, record, "merge", line);
+  for (const std::string& line : judge_kept(parts)) add_note(job, record, kMergeStage, line);
   for (const std::string& line : judge_motions(job.block, inputs.tiles, parts)) {
     record.notes.push_back(line);
-    say(job, "merge", line);
+    say(job, kMergeStage, line);
   }
   job.tables.release();  // frames
   BlockResult result = assemble_result(job, record, own.block, inputs.tiles, not_oriented, std::move(outcome), parts);
-  if (!reason.empty()) result.failures.push_back({"merge", kResult, reason});
+  if (!reason.empty()) result.failures.push_back({kMergeStage, kResult, reason});
   result.stages = statistics_of(job, record, event);
   std::vector<PartTracks::File> files;
   for (const TilePart& part : parts) files.push_back({part_path(job, part.tile), part.track_count});
@@ -294,7 +295,7 @@ void run_merge(const Stage& stage, const Job& job, JobRecord& record, JobBlock& 
   clear_scratch(job, false);
   const std::vector<TilePart> parts = gather_parts(job, adjusted, tracks.size());
   UnitEvent event;
-  event.stage = "merge";
+  event.stage = kMergeStage;
   event.unit = kResult;
   event.peak_rss_mib = largest(job, peak_rss_mib());
   event.figures = adjusted.costs.figures();

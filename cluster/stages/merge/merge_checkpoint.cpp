@@ -10,6 +10,7 @@
 
 #include "adjust/tile/image_sigma.h"
 #include "cluster/job/messages.h"
+#include "cluster/job/stage.h"
 #include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/process_memory.h"
@@ -96,7 +97,7 @@ void MergeCheckpoint::write(const MergePosition& position, TileStore& tiles, con
     job_.store.write(here + "/state.h5", fingerprint(here), [&](const std::string& path) { write_state(path, state); });
     job_.store.write(here + kMarker, fingerprint(here), [&](const std::string& path) { write_marker(path, position); });
     UnitEvent event;
-    event.stage = "merge";
+    event.stage = kMergeStage;
     event.unit = here;
     event.seconds = monotonic_seconds() - last_s_;
     event.peak_rss_mib = peak_rss_mib();
@@ -173,7 +174,7 @@ std::optional<MergePosition> MergeCheckpoint::find_sweep(const MergePosition& st
     std::memcpy(&position, there.data(), sizeof position);
     if (!furthest || order(furthest->global) < order(position.global)) furthest = position;
   }
-  if (furthest) say(job_, "merge", "resumes within a sweep: " + std::to_string(tiles) + " tiles are done");
+  if (furthest) say(job_, kMergeStage, "resumes within a sweep: " + std::to_string(tiles) + " tiles are done");
   return furthest;
 }
 

@@ -10,6 +10,7 @@
 #include "adjust/terms/build_problem.h"
 #include "adjust/tile/image_sigma.h"
 #include "cluster/job/messages.h"
+#include "cluster/job/stage.h"
 #include "cluster/mpi/matrix_bytes.h"
 #include "cluster/stages/merge/merge_start.h"
 
@@ -189,14 +190,14 @@ MergeCosts gather_costs(const Job& job, const TileStore& tiles, const MergeTreeR
 
 void say_costs(const Job& job, const MergeCosts& costs) {
   if (!job.is_first_rank()) return;
-  say(job, "merge",
+  say(job, kMergeStage,
       fmt::format("fronts above the tiles: widest {} unknowns, at the root {}, {:.3g} operations", costs.fronts.widest,
                   costs.fronts.root, costs.fronts.operations));
-  say(job, "merge",
+  say(job, kMergeStage,
       fmt::format(
           "last round: {:.1f} s, of them {:.1f} s on tiles and {:.1f} s on fronts above them (mean of the ranks)",
           costs.seconds, costs.tile_seconds / job.ranks.size(), costs.front_seconds / job.ranks.size()));
-  say(job, "merge",
+  say(job, kMergeStage,
       fmt::format("{} of {} tiles in scratch; factors: {} made, {} spilled to scratch, {} subtrees computed again, at "
                   "most {:.1f} MiB on a rank",
                   costs.tiles_in_scratch, costs.tiles, costs.factors.put, costs.factors.spilled,

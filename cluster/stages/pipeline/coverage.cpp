@@ -139,7 +139,7 @@ std::string coverage_note(const Coverages& coverage, const NameTable<ImageIndex>
 void check_coverage(const JobStore& store) {
   const std::string path = store.path(kTable), remedy = "; delete it and run the job again, which writes it anew";
   const std::vector<std::string> columns = csv_fields(kHeader);
-  if (store.list("coverage").empty()) return;
+  if (store.list(find_stage(kCoverageStage)->folder()).empty()) return;
   if (!std::filesystem::exists(path)) throw StoreError(path + ": is missing; run the job again, which writes it");
   std::ifstream file = open_input(path);
   std::string row;

@@ -175,7 +175,7 @@ FeatureStage run_features(const Stage& stage, const Job& job, JobRecord& record)
   return made;
 }
 
-std::string feature_unit(std::int64_t shard) { return unit_name(find_stage("features")->folder(), shard); }
+std::string feature_unit(std::int64_t shard) { return unit_name(find_stage(kFeatureStage)->folder(), shard); }
 
 const FeatureCache::Shard& FeatureCache::shard(std::int64_t number) {
   auto found = std::find_if(shards_.begin(), shards_.end(), [&](const Shard& s) { return s.number == number; });

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "cluster/job/job_json.h"
+#include "cluster/job/stage.h"
 #include "cluster/process/arithmetic.h"
 #include "cluster/process/version.h"
 #include "cluster/stages/pipeline/features.h"
@@ -55,7 +56,7 @@ Provenance provenance_of(const Job& job) {
 
 IndexedVector<ImageIndex, ImageRecord> image_records(const Job& job, const JobRecord& record) {
   IndexedVector<ImageIndex, ImageRecord> records;
-  const std::vector<std::string> shards = units_of(record, "features");
+  const std::vector<std::string> shards = units_of(record, kFeatureStage);
   if (shards.empty()) return records;
   records.assign(job.block.images.size(), {-1, -1, 0, 0, 0});
   for (const std::string& shard : shards)
@@ -66,7 +67,7 @@ IndexedVector<ImageIndex, ImageRecord> image_records(const Job& job, const JobRe
       if (image.height > 0) row.height = image.height;
       row.features = static_cast<std::int64_t>(image.keypoints.size());
     }
-  for (const std::string& cell : units_of(record, "matching")) {
+  for (const std::string& cell : units_of(record, kMatchingStage)) {
     if (!job.store.seal(cell)) continue;  // the unit failed
     for (const VerifiedPair& pair : read_matches(job.store.verified_path(cell))) {
       if (pair.model == PairModel::kNone) continue;
