@@ -86,6 +86,12 @@ Tiles single_tile(const Block& block) {
   return tiles;
 }
 
+std::int64_t frame_of_point(const TileProblem& problem, std::int64_t point) {
+  for (std::int64_t row = problem.begin[point]; row < problem.begin[point + 1]; ++row)
+    if (problem.kept[row]) return problem.images[problem.image[row].value].frame.value;
+  return -1;
+}
+
 // Only lower rows are compared, so that one pair of mounts does not count twice. 1e-9 m tells mounts at the same place,
 // whose distance says nothing of the scale.
 bool rig_gives_scale(const TileProblem& problem, const TileState& state, std::size_t mount) {

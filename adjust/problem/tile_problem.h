@@ -207,6 +207,10 @@ TileIndex owner_tile(const Tiles& tiles, FrameIndex first, FrameIndex second);
 // The whole block as one tile.
 Tiles single_tile(const Block& block);
 
+// The frame row of an active point's first kept observation; -1 without one. All observations of a point are in one
+// part of the tile, so it tells the part of the point.
+std::int64_t frame_of_point(const TileProblem& problem, std::int64_t point);
+
 // Whether a held mount and one in a lower row of its rig are at different places. They then give the scale of the
 // ground.
 bool rig_gives_scale(const TileProblem& problem, const TileState& state, std::size_t mount);

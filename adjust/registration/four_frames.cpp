@@ -23,7 +23,7 @@ namespace {
 
 // A held pair is a pair with sigmas far below those of any registration.
 constexpr double kHeldRotation = 1e-9, kHeldPosition = 1e-7;  // sigmas of a held pair, rad and m
-constexpr double kFarthest = 500;                             // largest distance of a point from its frame, metres
+constexpr double kFarthestPoint = 500;                        // largest distance of a point from its frame, metres
 
 double inverse_or(double sigma, double held) { return 1 / (sigma > 0 ? sigma : held); }
 
@@ -43,7 +43,7 @@ std::optional<Eigen::Vector3d> nearest_point(const FourFrameTrack& track, const 
     ++count;
   }
   const Eigen::Vector3d point = solve_symmetric3(normal, right);
-  if (count < 2 || !point.allFinite() || point.norm() > kFarthest) return std::nullopt;
+  if (count < 2 || !point.allFinite() || point.norm() > kFarthestPoint) return std::nullopt;
   return point;
 }
 
@@ -94,7 +94,7 @@ std::optional<FourFrames::Intersection> FourFrames::intersect(const FourFrameTra
     const Eigen::Vector3d step = solve_symmetric3(normal, right);
     if (!step.allFinite()) return std::nullopt;
     *point += step;
-    if (!(point->norm() < kFarthest)) return std::nullopt;
+    if (!(point->norm() < kFarthestPoint)) return std::nullopt;
     if (step.squaredNorm() < 1e-12 * point->squaredNorm()) break;
   }
   return Intersection{*point, (normal * inverse_variance_).inverse()};

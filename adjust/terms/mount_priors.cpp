@@ -1,8 +1,7 @@
 // Defines the terms for priors of mounts: r = Log(R R_0') / sigma (radians), (C - C_0) / sigma (metres, in the rig).
 //
 // The tile of the first oriented image with the mount owns them. Their information about the scale is not given here:
-// it depends on the other mounts of the rig, so that the datum takes it from the rig (merge/datum,
-// adjust/tile/datum.h).
+// it depends on the other mounts of the rig (similarity_information.h).
 #include "adjust/terms/automatic_terms.h"
 #include "adjust/terms/linearise.h"
 #include "adjust/terms/rotation_difference.h"

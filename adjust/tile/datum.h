@@ -1,14 +1,8 @@
 // Finds the directions of the datum that the observations of a tile leave free, and gives minimal constraints for them.
 //
-// A similarity of the ground (rotation phi about the centroid c, shift L t, scale 1 + s; L the extent of the frames)
-// moves the unknowns by
-//
-//     frames   dw = -phi,  dC = phi x (C - c) + L t + s (C - c)         points   dX as dC         mounts   dC_m = s C_m
-//
-// and leaves every image residual unchanged (the scale only where no two held mounts of a rig fix it). With J the
-// Jacobians of the priors and S the similarity above, the directions that change no other residual either are the null
-// space of the 7 x 7 matrix sum (J S)'(J S). To constrain two frames along these directions is a minimal constraint: it
-// is zero at the optimum and shifts no adjusted observation.
+// The directions that change no residual are the null space of the 7 x 7 matrix of similarity_information.h. To
+// constrain two frames along these directions is a minimal constraint: it is zero at the optimum and shifts no adjusted
+// observation.
 #pragma once
 
 #include <ceres/problem.h>

@@ -248,32 +248,6 @@ void hold_frames(const PartGroup& group, const BlockComponent& c, std::vector<Ga
 
 }  // namespace
 
-Matrix37 similarity_of_point(const Eigen::Vector3d& position, const Eigen::Vector3d& centre, double extent) {
-  const Eigen::Vector3d arm = position - centre;
-  Matrix37 move;
-  move << -skew<double>(arm), extent * Eigen::Matrix3d::Identity(), arm;
-  return move;
-}
-
-Eigen::Vector3d reference_place(const TileProblem& problem, const TileState& state, std::size_t frame) {
-  return state.frames[frame].centre + state.frames[frame].rotation.conjugate() * problem.reference_of_frame[frame];
-}
-
-Matrix67 similarity_of_frame(const Eigen::Vector3d& position, const Eigen::Vector3d& reference,
-                             const Eigen::Vector3d& centre, double extent) {
-  Matrix67 move = Matrix67::Zero();
-  move.topLeftCorner<3, 3>() = -Eigen::Matrix3d::Identity();
-  move.bottomRows<3>() = similarity_of_point(position, centre, extent);
-  move.bottomRightCorner<3, 1>() = reference - centre;
-  return move;
-}
-
-Matrix67 similarity_of_mount(const TileProblem& problem, const TileState& state, std::size_t mount) {
-  Matrix67 move = Matrix67::Zero();
-  move.bottomRightCorner<3, 1>() = state.mounts[mount].centre - problem.reference_of_mount[mount];
-  return move;
-}
-
 BlockComponent::FreeMoves BlockComponent::free_part(const Matrix67& similarity) const {
   return similarity * directions.leftCols(std::ssize(columns));
 }

@@ -1,23 +1,12 @@
 // Finds the directions of the datum that the observations of the block leave free, and fixes them by minimal
 // constraints. Covariances are expressed under inner constraints. Every free direction is reported.
 //
-// A similarity of the ground has the rotation phi (radians) about the centroid c of a component, the shift L t and the
-// scale 1 + s, where L is the extent of the component in metres. It moves
-//
-//     points   dX = phi x (X - c) + L t + s (X - c)
-//     frames   dw = -phi,  dC = phi x (C - c) + L t + s (C + R'C_0 - c)
-//     mounts   dC_m = s (C_m - C_0),   C_0 that of the rig's first mount, which is held and so moves with the frame
-//
-// and changes no image residual; the scale only where two held mounts of a rig do not fix it. The frame's centre C does
-// not grow about c itself: the camera of the first mount is at the reference place C + R'C_0, it must move as a point
-// does, and C_0 keeps its length. The other cameras of the rig follow because their mounts grow about C_0.
-//
-// Let N be the matrix of these movements, with the columns (phi, t, s), and J the Jacobian of all residuals. Images
-// give J N = 0, so only the other observations tell the similarity, by the 7 x 7 matrix sum (J N)'(J N) of their
-// residuals. Its null space is free: 7 directions for single cameras without priors, 6 with held rigs, 1 for positions
-// on one straight line, 4 with attitudes only. A rotation also counts as free when the priors give it no better than to
-// a radian, and a scale when they give it no better than to a factor (positions that are within their own noise of a
-// straight line): the linearised system says nothing of such directions.
+// similarity_information.h says how a similarity moves the unknowns (the matrix N) and what the observations tell of
+// it, by the 7 x 7 matrix sum (J N)'(J N) of their residuals. Its null space is free: 7 directions for single cameras
+// without priors, 6 with held rigs, 1 for positions on one straight line, 4 with attitudes only. A rotation also counts
+// as free when the priors give it no better than to a radian, and a scale when they give it no better than to a factor
+// (positions that are within their own noise of a straight line): the linearised system says nothing of such
+// directions.
 //
 // The free directions belong to a connected component of the block, and are found before every sweep up. Pivots that
 // vanish in spite of the datum (front.h) are unknowns that too few observations determine; they are reported as such.
@@ -44,17 +33,14 @@
 #include <vector>
 
 #include "adjust/problem/tile_problem.h"
+#include "adjust/terms/similarity_information.h"
 #include "merge/tile/condense.h"
 
 namespace megablock {
 
-using Matrix37 = Eigen::Matrix<double, 3, 7>;
-using Matrix67 = Eigen::Matrix<double, 6, 7>;
-using Matrix77 = Eigen::Matrix<double, 7, 7>;
-
 // A part of a tile that holds together, with the tile's information about the datum of its component. It is small, and
 // every rank gathers the parts of all tiles: the datum of the block follows from them alone.
-struct GaugePart {
+struct GaugePart : SimilarityInformation {
   std::vector<std::int64_t> boundary_frames;  // frames that other tiles may share, ascending indices of the block
   std::int64_t frames = 0;                    // number of frames of the part, separator frames included
   std::int64_t lowest_frame = -1;             // index in the block
@@ -62,11 +48,7 @@ struct GaugePart {
   // The second frame of the minimal constraints, far from the first one, is chosen among these.
   std::array<std::int64_t, 6> extreme_frames{};  // indices of the frames with the smallest and largest east, north, up
   Eigen::Matrix<double, 3, 6> extreme_centres = Eigen::Matrix<double, 3, 6>::Zero();
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // c of `normal`
-  double extent = 1;                                 // L of `normal`, metres
-  Matrix77 normal = Matrix77::Zero();                // sum (J N)'(J N) over the part's residuals
-  Matrix77 held = Matrix77::Zero();  // sum N_C'N_C over held positions; N_C: the rows of N of a position
-  std::vector<UnknownId> mounts;     // free mounts that see points of the part and that a scale moves
+  std::vector<UnknownId> mounts;  // free mounts that see points of the part and that a scale moves
 };
 
 // The parts of one tile, by their lowest frame.
@@ -77,16 +59,6 @@ struct TileGauge {
 };
 // Needs all tables of the tile, also those that may lie in scratch (tile_store.h).
 TileGauge tile_gauge(const TileProblem& problem, const TilePlan& plan, const TileState& state);
-
-// The reference place C + R'C_0 of a frame row.
-Eigen::Vector3d reference_place(const TileProblem& problem, const TileState& state, std::size_t frame);
-
-// The movement by a similarity about `centre`, with columns (phi, t, s): rows of N, radians and metres. `reference` is
-// the reference place of the frame. That of a mount has only the column of the scale.
-Matrix67 similarity_of_frame(const Eigen::Vector3d& position, const Eigen::Vector3d& reference,
-                             const Eigen::Vector3d& centre, double extent);
-Matrix37 similarity_of_point(const Eigen::Vector3d& position, const Eigen::Vector3d& centre, double extent);
-Matrix67 similarity_of_mount(const TileProblem& problem, const TileState& state, std::size_t mount);
 
 // A connected component of the block.
 struct BlockComponent {

@@ -1,14 +1,7 @@
-// Computes the information of one tile about the datum: how far its priors determine the similarities of each part.
-//
-// For every residual r that is not an image observation, J = dr/dx by the frame, point or mount that it observes, and N
-// the rows of this unknown (gauge.h), the part's matrix grows by (J N)'(J N). Residuals are divided by their sigmas, so
-// that an element about a rotation has the unit 1 / rad^2, and one about a shift is a number of sigmas in an extent,
-// squared. Robust losses are not applied.
+// Computes the information of one tile about the datum: how far its priors determine the similarities of each part
+// (similarity_information.h).
 #include <algorithm>
-#include <type_traits>
 
-#include "adjust/terms/linearise.h"
-#include "adjust/terms/terms.h"
 #include "merge/datum/gauge.h"
 #include "merge/plan/unknowns.h"
 
@@ -16,8 +9,6 @@ namespace megablock {
 
 namespace {
 
-// Weight of the scale in a part where held mounts fix it, as if a prior gave it to a thousandth.
-constexpr double kScaleGiven = 1e6;
 constexpr double kAtReference = 1e-9;  // metres: a mount nearer to its rig's reference is not moved by a scale
 
 // Fills the parts of a tile.
@@ -29,9 +20,9 @@ class PartBuilder {
   std::vector<GaugePart> build() {
     parts_.resize(at(plan_.part_count));
     describe_frames();
-    add_terms();
-    add_point_priors();
-    add_mounts();
+    std::vector<SimilarityInformation*> information;
+    for (GaugePart& part : parts_) information.push_back(&part);
+    add_similarity_information(problem_, state_, part_, information);
     list_free_mounts();
     return std::move(parts_);
   }
@@ -69,72 +60,7 @@ class PartBuilder {
     part.extreme_centres.col(side) = centre;
   }
 
-  template <typename Derived>
-  static void add(GaugePart& part, const Eigen::MatrixBase<Derived>& residual_by_similarity) {
-    part.normal += residual_by_similarity.transpose() * residual_by_similarity;
-  }
-  Eigen::Vector3d reference(LocalFrame frame) const { return reference_place(problem_, state_, at(frame.value)); }
   GaugePart& part_of(LocalFrame frame) { return parts_[at(part_[at(frame.value)])]; }
-  // N of a frame, about the centre of its part.
-  Matrix67 move(const GaugePart& part, LocalFrame frame) const {
-    return similarity_of_frame(state_.frames[at(frame.value)].centre, reference(frame), part.centre, part.extent);
-  }
-
-  void add_terms() {
-    for (const ObservationType* type : observation_types())
-      for (std::size_t row = 0; row < type->count(problem_); ++row) add_term(type->datum(problem_, state_, row));
-  }
-  void add_term(const TermDatum& term) {
-    if (term.frame < 0) return;
-    const LocalFrame frame(term.frame);
-    GaugePart& part = part_of(frame);
-    // The length of a base grows by its own length with the scale: d|b| / ds = |b|.
-    if (term.base_to >= 0) {
-      const Eigen::Vector3d base = reference(LocalFrame(term.base_to)) - reference(frame);
-      part.normal(6, 6) += base.squaredNorm() / (term.base_sigma_m * term.base_sigma_m);
-      return;
-    }
-    const Matrix67 moved = move(part, frame);
-    std::visit(
-        [&](const auto& by_frame) {
-          if constexpr (!std::is_same_v<std::decay_t<decltype(by_frame)>, std::monostate>) add(part, by_frame * moved);
-        },
-        term.by_frame);
-    // Directions that move held positions are no motions of the whole component (BlockComponent::movable). The sigma
-    // does not matter here, only whether they move.
-    if (term.holds_place) part.held += moved.bottomRows<3>().transpose() * moved.bottomRows<3>();
-  }
-
-  // Priors of control points. The point moves by dX of gauge.h, and its residual is divided by sigma on each axis; an
-  // infinite sigma adds nothing.
-  void add_point_priors() {
-    for (const auto& term : problem_.point_priors) {
-      const std::int64_t point = term.point.value;
-      if (!problem_.active(point)) continue;
-      GaugePart& part = parts_[at(part_[at(frame_of_point(problem_, point))])];
-      add(part, term.sigma.cwiseInverse().asDiagonal() *
-                    similarity_of_point(state_.points[at(point)], part.centre, part.extent));
-    }
-  }
-
-  // Mounts tell the scale alone: a similarity of the ground turns and shifts no mount. A mount counts in every part
-  // that has images of it.
-  void add_mounts() {
-    std::vector<std::pair<std::int64_t, std::int32_t>> seen;  // (part, mount)
-    for (const TileImage& image : problem_.images)
-      if (part_[at(image.frame.value)] >= 0) seen.emplace_back(part_[at(image.frame.value)], image.mount);
-    std::sort(seen.begin(), seen.end());
-    seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
-    for (const auto& [part, mount] : seen) {
-      if (rig_gives_scale(problem_, state_, at(mount))) parts_[at(part)].normal(6, 6) += kScaleGiven;
-      for (const auto& term : problem_.mount_priors) {
-        if (term.mount != mount) continue;
-        const Matrix67 scaled = similarity_of_mount(problem_, state_, at(mount));
-        parts_[at(part)].normal(6, 6) +=
-            (linearise_mount(state_.mounts[at(mount)], term).by_mount * scaled.col(6)).squaredNorm();
-      }
-    }
-  }
 
   // A free mount that sees points carries the scale of one part to all others that it sees. A mount without kept
   // observations, or one that a scale does not move, carries nothing.

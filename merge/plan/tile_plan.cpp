@@ -244,12 +244,6 @@ UnknownList tile_unknowns(const TileProblem& problem, const std::vector<Paramete
   return unknowns;
 }
 
-std::int64_t frame_of_point(const TileProblem& problem, std::int64_t point) {
-  for (std::int64_t row = problem.begin[point]; row < problem.begin[point + 1]; ++row)
-    if (problem.kept[row]) return problem.images[problem.image[row].value].frame.value;
-  return -1;
-}
-
 namespace {
 
 TilePlan plan_of(const TileProblem& problem, const PlanNode& node, const UnknownList& unknowns,

@@ -34,9 +34,6 @@ struct TilePlan {
   void write(ByteWriter& out) const;
   static TilePlan read(ByteReader& in);
 };
-// The frame row of an active point's first kept observation; -1 without one. All observations of a point are in one
-// part of the tile, so it tells the part of the point.
-std::int64_t frame_of_point(const TileProblem& problem, std::int64_t point);
 // `node` is the tile's leaf in the plan of the merge tree: its `separator` unknowns are the separator of the tile.
 // Cells have at most `cell_max_frames` frames; 24 and 32 were slower for two threads and no faster for one.
 TilePlan make_tile_plan(const TileProblem& problem, const PlanNode& node, std::int64_t cell_max_frames = 16);
