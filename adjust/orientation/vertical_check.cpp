@@ -28,9 +28,9 @@ namespace megablock {
 
 namespace {
 
-constexpr double kLevel = 1e-3;            // share of correct pairs that the test rejects
-constexpr double kLeaning = 1 * kDegree;   // allowance for walls that lean, and for a common drift of rotations
-constexpr double kFarthest = 3 * kDegree;  // largest sigma of a relative rotation for a comparison
+constexpr double kLevel = 1e-3;                 // share of correct pairs that the test rejects
+constexpr double kLeaning = 1 * kDegree;        // allowance for walls that lean, and for a common drift of rotations
+constexpr double kWorstRotation = 3 * kDegree;  // largest sigma of a relative rotation for a comparison
 constexpr double kShareOfAll = 1. / 3, kShareOfAgreeing = 0.8;  // of an accepted group
 constexpr std::size_t kFewest = 2;                              // verticals of a group
 
@@ -103,7 +103,8 @@ class Vicinity {
     std::priority_queue<Open, std::vector<Open>, std::greater<>> open;
     const auto reach = [&](std::int32_t node, double variance) {
       // `round_` says for which start `best_` holds, so that the array need not be cleared for every node.
-      if (variance > kFarthest * kFarthest || (round_[row(node)] == start && best_[row(node)] <= variance)) return;
+      if (variance > kWorstRotation * kWorstRotation || (round_[row(node)] == start && best_[row(node)] <= variance))
+        return;
       round_[row(node)] = start;
       best_[row(node)] = variance;
       open.push({variance, node});

@@ -13,17 +13,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "adjust/orientation/steps/levelling.h"
 #include "geometry/numbers/decompositions.h"
 
 namespace megablock {
 
 namespace {
 
-// Mean viewing direction and mean y axis of the oriented images, ground axes (not normalised).
-struct MeanAxes {
-  Eigen::Vector3d view = Eigen::Vector3d::Zero(), down = Eigen::Vector3d::Zero();
-};
-
+// The mean axes of the oriented images.
 MeanAxes mean_axes(const OrientationGraph& graph, const OrientationValues& values) {
   MeanAxes result;
   double count = 0;
@@ -38,33 +35,12 @@ MeanAxes mean_axes(const OrientationGraph& graph, const OrientationValues& value
   return result;
 }
 
-// Rotation about the unit axis that brings the part of `from` across the axis onto that of `to`.
-Eigen::Quaterniond turn_about(const Eigen::Vector3d& axis, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
-  const double sine = axis.dot(from.cross(to));
-  const double cosine = from.dot(to) - axis.dot(from) * axis.dot(to);
-  return Eigen::Quaterniond(Eigen::AngleAxisd(std::atan2(sine, cosine), axis));
-}
-
 // The part of a rotation that is not about the axis (swing of the swing-twist decomposition).
 Eigen::Quaterniond without_twist(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& axis) {
   const double along = rotation.vec().dot(axis);
   const Eigen::Quaterniond twist(rotation.w(), along * axis.x(), along * axis.y(), along * axis.z());
   if (!(twist.norm() > 1e-9)) return rotation;
   return rotation * twist.normalized().conjugate();
-}
-
-// The mean of a direction over images that look to all sides is short. A mean that is shorter than 0.7 across the line
-// does not say what is down; if both are long, the distance of the points decides between an aerial block and a street.
-Eigen::Vector3d which_points_down(const OrientationGraph& graph, const OrientationValues& values,
-                                  const Similarity& similarity, const Eigen::Vector3d& line, double distance_m) {
-  MeanAxes axes = mean_axes(graph, values);
-  axes.view = similarity.rotation * axes.view;
-  axes.down = similarity.rotation * axes.down;
-  const auto across = [&](const Eigen::Vector3d& v) { return (v - line * line.dot(v)).norm(); };
-  constexpr double kClear = 0.7, kNadirDistance = 25;  // metres
-  if (across(axes.view) < kClear) return axes.down;
-  if (across(axes.down) < kClear) return axes.view;
-  return distance_m > kNadirDistance ? axes.view : axes.down;
 }
 
 struct KnownPositions {
@@ -175,7 +151,10 @@ std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, co
     rotation = without_twist(similarity->rotation, similarity->rotation.conjugate() * axis);
   } else {
     const double distance = similarity->scale * median_distance;
-    const Eigen::Vector3d down = which_points_down(graph, values, *similarity, axis, distance);
+    MeanAxes axes = mean_axes(graph, values);
+    axes.view = similarity->rotation * axes.view;
+    axes.down = similarity->rotation * axes.down;
+    const Eigen::Vector3d down = which_points_down(axes, axis, distance);
     rotation = turn_about(axis, down, -Eigen::Vector3d::UnitZ()) * similarity->rotation;
   }
   const Eigen::Vector3d centre = mean / count;  // on the line, so that it stays in place

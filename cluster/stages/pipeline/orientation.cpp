@@ -10,6 +10,7 @@
 #include <map>
 #include <set>
 
+#include "adjust/orientation/control_alignment.h"
 #include "adjust/orientation/given_trajectories.h"
 #include "adjust/orientation/orientation.h"
 #include "adjust/orientation/vertical_check.h"
@@ -20,6 +21,7 @@
 #include "cluster/stages/common/growth.h"
 #include "cluster/stages/common/units.h"
 #include "cluster/stages/pipeline/features.h"
+#include "io/base/disjoint_sets.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
 #include "io/block/held_priors.h"
@@ -208,6 +210,42 @@ BlockState given_orientation(const Stage& stage, const Job& job, BlockState give
   return held_in_place(job, std::move(given));
 }
 
+// Frames that verified pairs connect, as sets that grow with the pairs.
+void unite_frames(const Block& block, const std::vector<VerifiedPair>& pairs, DisjointSets& sets) {
+  for (const VerifiedPair& pair : pairs) sets.unite(block.images[pair.a].frame.value, block.images[pair.b].frame.value);
+}
+
+// Moves the parts of the block that have neither positions nor given poses onto the control points.
+void move_onto_control(const Stage& stage, const Job& job, JobRecord& record, DisjointSets& sets, BlockState& state) {
+  const Block& block = job.block;
+  if (std::ranges::none_of(block.control_points, [](const auto& p) { return p.role == PointRole::kControl; })) return;
+  std::map<std::int64_t, std::vector<FrameIndex>> parts;
+  std::set<std::int64_t> placed;
+  for (FrameIndex f(0); block.frames.contains(f); ++f.value) {
+    if (!state.oriented[f]) continue;
+    const std::int64_t part = sets.find(f.value);
+    parts[part].push_back(f);
+    const Frame& frame = block.frames[f];
+    if (frame.given_pose || (job.settings.adjustment.observations.use_position_priors && frame.position_prior))
+      placed.insert(part);
+  }
+  for (const auto& [part, frames] : parts) {
+    if (placed.contains(part)) continue;
+    const auto aligned = align_with_control(block, state, frames);
+    if (!aligned) continue;
+    move_frames(aligned->similarity, frames, state);
+    say(job, stage.name,
+        fmt::format(
+            "{} moved onto the control: {} of {} fit within {:.1f} px (median){}", counted(std::ssize(frames), "frame"),
+            aligned->agreeing, counted(aligned->points, "control point"), aligned->median_residual_px,
+            aligned->on_a_line ? "; they lie on one line, so that the viewing directions level the block" : ""));
+    if (aligned->on_a_line)
+      record.notes.push_back(
+          "the control points lie on one line: the tilt of the block about it follows from the viewing directions of "
+          "the images alone; add a control point off the line, positions or attitudes");
+  }
+}
+
 }  // namespace
 
 OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& record,
@@ -228,6 +266,7 @@ OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& 
   BlockState& state = made.state;
   std::uint64_t previous = 0;
   std::int64_t images_before = 0;
+  DisjointSets connected(std::ssize(job.block.frames));
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
     const Block block = first_images(job.block, job.generations[g]);
     Hasher hasher;
@@ -235,6 +274,7 @@ OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& 
     add_to_hash(hasher, job.settings.orientation);
     add_block_values(hasher, block);
     const std::vector<VerifiedPair> pairs = pairs_of_generation(job, matches, job.generations[g], hasher);
+    unite_frames(block, pairs, connected);
     Unit unit;
     unit.name = unit_name(stage.folder(), static_cast<std::int64_t>(g));
     unit.fingerprint = hasher.value();
@@ -257,6 +297,7 @@ OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& 
   }
   tell_of_verticals(stage, job, record, aside, all);
   state = held_in_place(job, grow(state, job.block));
+  move_onto_control(stage, job, record, connected, state);
   return made;
 }
 

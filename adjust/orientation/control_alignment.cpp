@@ -1,0 +1,317 @@
+// Least trimmed squares over the control points (P. Rousseeuw, "Least median of squares regression", JASA 79, 1984).
+//
+// A similarity S is proposed by every sample of three control points, from their intersections in the frame of the
+// block. Its residual at a point i is the median, over the marks of the point, of the distance in the image between the
+// mark and the known position, r_i(S) = med |project(S^-1 X_i) - x_ij|, in pixels. The best proposal has the smallest
+//
+//     sum over the h smallest r_i^2,   h = floor((n + p + 1) / 2),   p = 3 points of a sample,
+//
+// which n - h wrong points cannot spoil: one of five, three of ten. Residuals in the images compare points with one
+// mark and points without a height alike, and need no sigma. The proposal is then fitted to the h points and to all
+// that agree with them, until they no longer change.
+//
+// The first orientation of a block is bent by some pixels, and by more in long strips. A point agrees within
+// max(kMark_px, kAgree s), with s^2 the mean of the h smallest squares.
+#include "adjust/orientation/control_alignment.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "adjust/orientation/steps/levelling.h"
+#include "adjust/orientation/straight_line.h"
+#include "adjust/tile/consistent_rays.h"
+#include "geometry/similarity/minimal_control.h"
+#include "geometry/similarity/minimal_similarity.h"
+#include "io/block/held_priors.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr double kMark_px = 10;  // marks of a point meet within it in the first orientation (orientation.cpp, adjust())
+constexpr double kAgree = 4;     // times the rms of the best points
+constexpr std::size_t kMostSamples = 4000;  // all samples of three among 29 points
+constexpr double kNowhere = std::numeric_limits<double>::infinity();
+
+// A control point as the block sees it.
+struct SeenControl {
+  Eigen::Vector3d ground = Eigen::Vector3d::Zero();
+  std::array<bool, 3> known{};  // coordinates
+  std::vector<PointView> marks;
+  std::optional<Eigen::Vector3d> model;  // intersection in the frame of the block, where two marks or more agree
+  bool place() const { return known[0] && known[1] && model; }
+  bool height() const { return known[2] && model; }
+  bool full() const { return place() && height(); }
+};
+
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+class ControlAligner {
+ public:
+  ControlAligner(const Block& block, const BlockState& state, const std::vector<FrameIndex>& frames)
+      : block_(block), state_(state), frames_(frames) {
+    for (const FrameIndex frame : frames_)
+      for (const Mount& mount : block.rig_of(frame).mounts) metric_ = metric_ || mount.pose.centre.norm() > 0;
+    for (const ControlPoint& point : block.control_points) see(point);
+  }
+
+  std::optional<ControlAlignment> align() {
+    propose_all();
+    if (!best_) return std::nullopt;
+    refine();
+    ControlAlignment result{*best_, std::ssize(points_)};
+    std::vector<double> fitting;
+    const double limit = limit_of(*best_);
+    for (const SeenControl& point : points_)
+      if (const double r = residual_px(*best_, point); r <= limit) fitting.push_back(r);
+    result.agreeing = std::ssize(fitting);
+    if (2 * result.agreeing <= result.points || fitting.size() < 2) return std::nullopt;
+    result.median_residual_px = median_of(std::move(fitting));
+    result.on_a_line = level(result.similarity);
+    if (metric_) keep_scale(result.similarity);
+    return result;
+  }
+
+ private:
+  void see(const ControlPoint& point) {
+    if (point.role != PointRole::kControl) return;
+    SeenControl seen;
+    for (int axis = 0; axis < 3; ++axis) {
+      seen.known[static_cast<std::size_t>(axis)] =
+          std::isfinite(point.position[axis]) && point.sigma[axis] < kUnknownHeightSigma;
+      if (seen.known[static_cast<std::size_t>(axis)]) seen.ground[axis] = point.position[axis];
+    }
+    for (const ImageMeasurement& mark : point.measurements) {
+      const Image& image = block_.images[mark.image];
+      if (!std::binary_search(frames_.begin(), frames_.end(), image.frame) || !state_.oriented[image.frame]) continue;
+      const Pose& mount = state_.mounts[block_.frames[image.frame].rig][static_cast<std::size_t>(image.mount)];
+      seen.marks.push_back({camera_pose(state_.frames[image.frame], mount),
+                            &state_.cameras[block_.camera_of(mark.image)], mark.pixel, 1});
+    }
+    // The seed only matters for more than nine marks.
+    if (const auto rays = find_consistent_rays(seen.marks, kMark_px, 1)) seen.model = rays->point;
+    const bool all_known = seen.known[0] && seen.known[1] && seen.known[2];
+    if (seen.model ? (seen.place() || seen.height()) : (all_known && !seen.marks.empty()))
+      points_.push_back(std::move(seen));
+  }
+
+  // The median distance of the marks from the known position. A coordinate that is not known is that of the model.
+  double residual_px(const Similarity& similarity, const SeenControl& point) const {
+    Eigen::Vector3d target = point.ground;
+    if (point.model) {
+      const Eigen::Vector3d seen = similarity(*point.model);
+      for (int axis = 0; axis < 3; ++axis)
+        if (!point.known[static_cast<std::size_t>(axis)]) target[axis] = seen[axis];
+    }
+    const Eigen::Vector3d model = similarity.inverse()(target);
+    std::vector<double> distances;
+    for (const PointView& mark : point.marks) distances.push_back(residual_sigmas(mark, model));
+    return median_of(std::move(distances));
+  }
+
+  // The number h of points that decide on a similarity.
+  std::size_t decisive() const { return std::min(points_.size(), (points_.size() + 4) / 2); }
+  // The sum of the h smallest squares.
+  double trimmed_squares(const Similarity& similarity) const {
+    std::vector<double> squares;
+    for (const SeenControl& point : points_) {
+      const double r = residual_px(similarity, point);
+      squares.push_back(r * r);
+    }
+    std::sort(squares.begin(), squares.end());
+    double sum = 0;
+    for (std::size_t i = 0; i < decisive(); ++i) sum += squares[i];
+    return sum;
+  }
+  double limit_of(const Similarity& similarity) const {
+    return std::max(kMark_px, kAgree * std::sqrt(trimmed_squares(similarity) / static_cast<double>(decisive())));
+  }
+
+  void propose(const Similarity& similarity) {
+    const double squares = trimmed_squares(similarity);
+    if (!(squares < best_squares_)) return;
+    best_squares_ = squares;
+    best_ = similarity;
+  }
+
+  void propose_all() {
+    std::vector<std::size_t> full, places, heights;
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      if (points_[i].full()) full.push_back(i);
+      if (points_[i].place()) places.push_back(i);
+      if (points_[i].height()) heights.push_back(i);
+    }
+    if (full.size() >= 3) {
+      propose_triples(full);
+    } else if (places.size() >= 2 && places.size() + heights.size() > 3) {
+      propose_mixed(places, heights);
+    }
+    if (!best_ && full.size() == 2) propose_pair(full);
+  }
+
+  void propose_triple(std::size_t a, std::size_t b, std::size_t c) {
+    const SeenControl &p = points_[a], &q = points_[b], &r = points_[c];
+    if (const auto similarity = solve_similarity({*p.model, *q.model, *r.model}, {p.ground, q.ground, r.ground}))
+      propose(*similarity);
+  }
+  void propose_triples(const std::vector<std::size_t>& full) {
+    const std::size_t n = full.size();
+    if (n * (n - 1) * (n - 2) / 6 <= kMostSamples) {
+      for (std::size_t a = 0; a < n; ++a)
+        for (std::size_t b = a + 1; b < n; ++b)
+          for (std::size_t c = b + 1; c < n; ++c) propose_triple(full[a], full[b], full[c]);
+      return;
+    }
+    std::mt19937_64 random(n);
+    for (std::size_t k = 0; k < kMostSamples; ++k) {
+      const std::size_t a = random() % n, b = random() % n, c = random() % n;
+      if (a != b && b != c && a != c) propose_triple(full[a], full[b], full[c]);
+    }
+  }
+
+  // Draws of five or four points in the two minimal mixes.
+  void propose_mixed(const std::vector<std::size_t>& places, const std::vector<std::size_t>& heights) {
+    std::mt19937_64 random(points_.size());
+    const auto place = [&] {
+      const SeenControl& p = points_[places[random() % places.size()]];
+      return PlaceControl{*p.model, p.ground.head<2>()};
+    };
+    const auto height = [&] {
+      const SeenControl& p = points_[heights[random() % heights.size()]];
+      return HeightControl{*p.model, p.ground.z()};
+    };
+    // A draw that takes a point twice is degenerate and gives no solution.
+    for (std::size_t k = 0; k < kMostSamples; ++k) {
+      if (heights.size() >= 3) {
+        const std::array two{place(), place()};
+        const std::array three{height(), height(), height()};
+        for (const Similarity& similarity : solve_minimal_control(two, three)) propose(similarity);
+      }
+      if (places.size() >= 3 && !heights.empty()) {
+        const std::array three{place(), place(), place()};
+        for (const Similarity& similarity : solve_minimal_control(three, height())) propose(similarity);
+      }
+    }
+  }
+
+  // Two points leave the rotation about their line to level().
+  void propose_pair(const std::vector<std::size_t>& full) {
+    const SeenControl &p = points_[full[0]], &q = points_[full[1]];
+    const std::array from{*p.model, *q.model}, to{p.ground, q.ground};
+    const auto similarity = fit_similarity(from, to);
+    if (!similarity) return;
+    best_ = similarity;
+    // Points with a single mark see the rotation about the line, which is still open.
+    points_ = {p, q};
+  }
+
+  // Fits the similarity to the points that agree, as long as this makes it better.
+  void refine() {
+    constexpr int kRounds = 10;
+    for (int round = 0; round < kRounds; ++round) {
+      std::vector<Eigen::Vector3d> from, to;
+      const double limit = limit_of(*best_);
+      for (const SeenControl& point : points_) {
+        if (!point.full() || !(residual_px(*best_, point) <= limit)) continue;
+        from.push_back(*point.model);
+        to.push_back(point.ground);
+      }
+      if (from.size() < 3) return;
+      const auto fitted = fit_similarity(from, to);
+      if (!fitted) return;
+      const double before = best_squares_;
+      propose(*fitted);
+      if (!(best_squares_ < before)) return;
+    }
+  }
+
+  // Turns the block about the line of its control so that the images look or stand as they should. Returns whether the
+  // points lie on a line.
+  bool level(Similarity& similarity) const {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    std::vector<Eigen::Vector3d> agreeing;
+    const double limit = limit_of(similarity);
+    for (const SeenControl& point : points_)
+      if (point.full() && residual_px(similarity, point) <= limit) agreeing.push_back(point.ground);
+    if (agreeing.size() < 2) return false;
+    for (const Eigen::Vector3d& place : agreeing) mean += place / static_cast<double>(agreeing.size());
+    Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+    for (const Eigen::Vector3d& place : agreeing) scatter += (place - mean) * (place - mean).transpose();
+    const auto line = straight_line(scatter);
+    if (!line) return false;
+    const Eigen::Vector3d down = which_points_down(mean_axes(similarity), *line, distance(similarity));
+    const Eigen::Quaterniond turn = turn_about(*line, down, -Eigen::Vector3d::UnitZ());
+    similarity.translation = mean + turn * (similarity.translation - mean);
+    similarity.rotation = (turn * similarity.rotation).normalized();
+    return true;
+  }
+  // Sets the scale to one, with the centroid of the points that agree in its place.
+  void keep_scale(Similarity& similarity) const {
+    Eigen::Vector3d model = Eigen::Vector3d::Zero(), ground = Eigen::Vector3d::Zero();
+    double count = 0;
+    const double limit = limit_of(similarity);
+    for (const SeenControl& point : points_) {
+      if (!point.full() || !(residual_px(similarity, point) <= limit)) continue;
+      model += *point.model;
+      ground += point.ground;
+      ++count;
+    }
+    if (count == 0) return;
+    similarity.scale = 1;
+    similarity.translation = ground / count - similarity.rotation * (model / count);
+  }
+  MeanAxes mean_axes(const Similarity& similarity) const {
+    MeanAxes axes;
+    double count = 0;
+    for (const FrameIndex frame : frames_) {
+      if (!state_.oriented[frame]) continue;
+      for (const Pose& mount : state_.mounts[block_.frames[frame].rig]) {
+        const Eigen::Quaterniond turn =
+            similarity.rotation * camera_pose(state_.frames[frame], mount).rotation.conjugate();
+        axes.view += turn * Eigen::Vector3d::UnitZ();
+        axes.down += turn * Eigen::Vector3d::UnitY();
+        ++count;
+      }
+    }
+    axes.view /= count;
+    axes.down /= count;
+    return axes;
+  }
+  // The median distance of the control points from the images that see them, metres.
+  double distance(const Similarity& similarity) const {
+    std::vector<double> distances;
+    for (const SeenControl& point : points_)
+      for (const PointView& mark : point.marks)
+        if (point.full()) distances.push_back((similarity(mark.camera.centre) - point.ground).norm());
+    return median_of(std::move(distances));
+  }
+
+  const Block& block_;
+  const BlockState& state_;
+  const std::vector<FrameIndex>& frames_;
+  std::vector<SeenControl> points_;
+  bool metric_ = false;
+  std::optional<Similarity> best_;
+  double best_squares_ = kNowhere;
+};
+
+}  // namespace
+
+std::optional<ControlAlignment> align_with_control(const Block& block, const BlockState& state,
+                                                   const std::vector<FrameIndex>& frames) {
+  return ControlAligner(block, state, frames).align();
+}
+
+void move_frames(const Similarity& similarity, const std::vector<FrameIndex>& frames, BlockState& state) {
+  for (const FrameIndex frame : frames)
+    if (state.oriented[frame]) state.frames[frame] = similarity(state.frames[frame]);
+}
+
+}  // namespace megablock
