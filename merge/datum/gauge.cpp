@@ -12,7 +12,8 @@
 //     phi = -A^+ a s                                                       turned
 //     information about s = n_ss - n_st N_tt^+ n_ts - a'A^+ a              scale_information
 //
-// Rotations and the scale have natural units, and their information is compared with one (kDetermined). Shifts have
+// Rotations and the scale have natural units, and their information is compared with fixed limits: a rotation is
+// determined by a sigma below 0.2 rad, a scale by one below a factor (kTurnDetermined, kScaleDetermined). Shifts have
 // none; they are free in the null space alone, which is a share of the largest eigenvalue. Pseudo-inverses leave out
 // the eigenvectors that are free.
 #include "merge/datum/gauge.h"
@@ -34,7 +35,11 @@ using Vector7 = Eigen::Matrix<double, 7, 1>;
 constexpr double kNullDirection = 1e-11;  // share of the largest eigenvalue; the matrix itself has errors of 1e-15
 constexpr double kHeldDirection = 1e-6;   // share of the largest singular value: a frame holds the directions above it
 constexpr double kOnePlace = 1e-9;  // share of the coordinates: frames within a smaller extent are all at one place
-constexpr double kDetermined = 1;   // information of a rotation (1 / rad^2) or of a scale, below which it is free
+// Information of a rotation (1 / rad^2) and of a scale, below which they are free. A rotation by phi moves positions at
+// the distance L by phi^2 L / 2 off their tangents: at 0.2 rad this is 1 m for a block of 100 m. With a larger sigma
+// the linearised system says nothing of the rotation, and its steps do not end: positions without heights, for example,
+// leave the tilt of a level block to the curvature of the cosine.
+constexpr double kTurnDetermined = 25, kScaleDetermined = 1;
 
 // All parts of one component.
 struct PartGroup {
@@ -62,10 +67,11 @@ struct Freedom {
   double scale_information = 0;
   double limit = 0;  // below, the information of a direction is rounding
   bool has_scale = false;
+  bool against_priors = false;  // a free rotation has some information
 };
 
-// Shifts are free in the null space. Rotations are free where their information is less than 1 / rad^2, with the shifts
-// estimated along with them.
+// Shifts are free in the null space. Rotations are free where their information is less than kTurnDetermined, with the
+// shifts estimated along with them.
 Freedom freedom_of(const Matrix77& normal) {
   Freedom freedom;
   freedom.limit = kNullDirection * symmetric_eigen(normal).values(6);
@@ -88,9 +94,10 @@ Freedom freedom_of(const Matrix77& normal) {
   std::int64_t free_turns = 0;
   Eigen::Vector3d turned = Eigen::Vector3d::Zero();  // the rotation that follows from a scale of one
   for (int i = 0; i < 3; ++i) {
-    if (turn.values(i) <= std::max(freedom.limit, kDetermined))
+    if (turn.values(i) <= std::max(freedom.limit, kTurnDetermined)) {
       ++free_turns;
-    else
+      freedom.against_priors |= turn.values(i) > freedom.limit;
+    } else
       turned -= turn.vectors.col(i) * turn.vectors.col(i).dot(both) / turn.values(i);
   }
   // A free rotation takes along the shift that follows from it.
@@ -141,6 +148,7 @@ BlockComponent component_of(const PartGroup& group, Freedom& freedom) {
   // The held positions give sum L^2 I as the block of t and sum L (X - c) as the column of t and s.
   if (held(3, 3) > 0) c.pivot += c.extent * held.block<3, 1>(3, 6) / held(3, 3);
   freedom = freedom_of(normal);
+  c.against_priors = freedom.against_priors;
   // A scale moves no frame where all frames are at one place: a single frame that is known by its position only, for
   // example.
   freedom.has_scale = !one_place;
@@ -169,7 +177,7 @@ std::vector<std::size_t> scale_groups(const std::vector<PartGroup>& components) 
 void number_columns(const std::vector<std::size_t>& scale_group, const std::vector<Freedom>& freedoms,
                     std::vector<BlockComponent>& components) {
   struct Scale {
-    double information = 0, limit = kDetermined;
+    double information = 0, limit = kScaleDetermined;
     std::int64_t component = -1, column = -1;
     bool free() const { return component >= 0 && information <= limit; }
   };
@@ -221,6 +229,7 @@ void hold_frames(const PartGroup& group, const BlockComponent& c, std::vector<Ga
     if (rank > 0 && largest > 0) {
       GaugeConstraint constraint;
       constraint.frame = frame;
+      if (c.against_priors) constraint.weight = kFirmly;
       constraint.count = rank;
       constraint.directions.leftCols(rank) = moves * svd.v.leftCols(rank);
       constraints.push_back(constraint);
@@ -326,7 +335,7 @@ TileDatum tile_datum(const BlockGauge& gauge, std::int64_t tile, const TileProbl
   if (!gauge.free()) return datum;
   for (const GaugeConstraint& c : gauge.constraints) {
     const UnknownId id{UnknownKind::kFrame, 0, c.frame};
-    if (find_unknown(plan.owned, id) >= 0) datum.holds.push_back({id, c.directions.leftCols(c.count)});
+    if (find_unknown(plan.owned, id) >= 0) datum.holds.push_back({id, c.directions.leftCols(c.count), c.weight});
   }
   if (!with_columns) return datum;
   const auto components = free_component_of_frame(gauge, tile, plan);
