@@ -1,5 +1,6 @@
-// Positions and attitudes that are known exactly. They get a standard deviation far below that of any other
-// observation, so the adjustment holds them without a special case. A sigma of 0 in the project file means this.
+// Positions and attitudes that are known exactly, and heights that are not known. The former get a standard deviation
+// far below that of any other observation, so the adjustment holds them without a special case. A sigma of 0 in the
+// project file means this.
 //
 // Images determine a camera's position to micrometres at best and its attitude to nanoradians; a held value moves by a
 // millionth of that. Coordinates of 1000 km are rounded to a hundredth of the sigma.
@@ -11,6 +12,9 @@ namespace megablock {
 
 inline constexpr double kHeldPositionSigma = 1e-8;   // metres
 inline constexpr double kHeldAttitudeSigma = 1e-11;  // radians
+
+// The sigma of a height that is not known, metres: so large that the height is practically free.
+inline constexpr double kUnknownHeightSigma = 1000;
 
 // The factor of two allows for sigmas that were rounded in a rotation or conversion.
 inline bool held(const PositionPrior& prior) { return prior.sigma.minCoeff() <= 2 * kHeldPositionSigma; }

@@ -14,6 +14,7 @@
 #include "io/base/error.h"
 #include "io/block/crs.h"
 #include "io/block/held_priors.h"
+#include "io/evaluation/used_sigmas.h"
 #include "io/result/result_option.h"
 #include "io/store/units/state_file.h"
 
@@ -206,7 +207,7 @@ void evaluate_control(const BlockResult& result, double variance_factor, Evaluat
     vertical.add(error.z() * error.z());
     // Block and given position have independent errors, so the variances add. A control point took part, so its
     // difference is no error, and it has no normalised one here.
-    const Eigen::Matrix3d stated = point.sigma.cwiseAbs2().asDiagonal();
+    const Eigen::Matrix3d stated = used_sigma(result, point).cwiseAbs2().asDiagonal();
     normalised.add(error, variance_factor * found.covariance + stated);
   }
   evaluation.check_points = check.count();

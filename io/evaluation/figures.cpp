@@ -14,6 +14,7 @@
 #include "io/block/prior_differences.h"
 #include "io/evaluation/parts.h"
 #include "io/evaluation/reliability.h"
+#include "io/evaluation/used_sigmas.h"
 #include "io/result/result_option.h"
 
 namespace megablock::report {
@@ -281,8 +282,9 @@ class Gatherer {
       // so both variances add.
       // The covariance of the result may be scaled; a variance that is subtracted from must have the same scale.
       const double factor = result_.sigma_scaled && !check ? result_.variance_factor : 1;
+      const Eigen::Vector3d used = used_sigma(result_, given);
       for (int k = 0; k < 3; ++k) {
-        const double given_variance = factor * given.sigma[k] * given.sigma[k];
+        const double given_variance = factor * used[k] * used[k];
         const double variance = given_variance + (check ? 1 : -1) * control.covariance(k, k);
         // An adjusted variance that almost equals the given one means that the block does not check the point. Their
         // difference would be rounding.
@@ -460,7 +462,7 @@ void find_prior_residuals(const BlockResult& result, Figures& figures) {
     const Pose& pose = result.state.frames[f];
     const Frame& frame = result.block.frames[f];
     if (const auto& prior = frame.position_prior)
-      figures.positions.push_back({f, difference(pose, *prior), prior->sigma});
+      figures.positions.push_back({f, difference(pose, *prior), used_sigma(result, *prior)});
     if (const auto& prior = frame.attitude_prior)
       figures.attitudes.push_back({f, difference(pose, *prior), prior->sigma_rad});
   }

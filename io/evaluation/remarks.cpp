@@ -11,6 +11,7 @@
 #include "io/block/held_priors.h"
 #include "io/evaluation/figures.h"
 #include "io/evaluation/parts.h"
+#include "io/evaluation/used_sigmas.h"
 #include "io/result/result_option.h"
 #include "io/text/counted.h"
 
@@ -40,7 +41,7 @@ std::string pixels(double value) {
 // The observations that place a part: the number of positions (of frames and of control points that take part), and the
 // number of attitudes.
 struct Placing {
-  std::int64_t positions = 0, attitudes = 0;
+  std::int64_t positions = 0, heights = 0, attitudes = 0;  // heights: positions with a known height
 };
 
 // Median over the frames of a part of the largest sigma of the rotation, degrees.
@@ -56,7 +57,10 @@ Placing placing_of(const BlockResult& result, const report::Figures& figures, st
   Placing placing;
   for (FrameIndex f(0); result.block.frames.contains(f); ++f.value) {
     if (figures.part_of_frame[f] != part) continue;
-    placing.positions += result.block.frames[f].position_prior.has_value();
+    if (const auto& prior = result.block.frames[f].position_prior) {
+      ++placing.positions;
+      placing.heights += prior->sigma.z() < kUnknownHeightSigma;
+    }
     placing.attitudes += result.block.frames[f].attitude_prior.has_value();
   }
   for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
@@ -67,6 +71,7 @@ Placing placing_of(const BlockResult& result, const report::Figures& figures, st
       here = here || (result.control[p].takes_part(m) &&
                       figures.part_of_frame[result.block.images[given.measurements[m].image].frame] == part);
     placing.positions += here;
+    placing.heights += here && std::isfinite(given.position.z()) && given.sigma.z() < kUnknownHeightSigma;
   }
   return placing;
 }
@@ -82,6 +87,7 @@ std::string undetermined(int defect, const Placing& placing) {
   if (defect == 3) return placing.positions == 0 && placing.attitudes > 0 ? "its place" : "its direction";
   if (defect == 1)
     return placing.positions > 1 ? "the rotation about the line on which the positions or control points lie" : "scale";
+  if (defect == 2 && placing.positions > 2 && placing.heights == 0) return "its tilt, as no position has a height";
   return fmt::format("{} of the seven parameters of place, direction and scale", defect);
 }
 
@@ -141,6 +147,10 @@ std::string consequence(const BlockResult& result, int defect, const Placing& pl
   if (defect >= 6) return "coordinates are relative; add positions or three control points";
   if (defect == 1 && placing.positions > 1)
     return "heights and attitudes are not usable; add attitudes or control points away from that line" +
+           or_verticals(result);
+  if (defect == 2 && placing.positions > 2 && placing.heights == 0)
+    return "the block is as level as its images were taken to be; heights and attitudes are not usable; add heights, "
+           "attitudes or control points" +
            or_verticals(result);
   if (defect == 1 || defect == 4) return "lengths or directions are not usable; add positions or control points";
   return "coordinates are not usable as they are; add positions, attitudes or control points";
@@ -325,13 +335,16 @@ std::vector<std::string> misstated_texts(const BlockResult& result) {
     const ObservationStatistics& s = result.observation_table.kinds[k];
     const double factor = s.sigma_factor();
     if (kind == kTieImage || kind == kCheckImage || !(factor > std::max(kMisstated, 1 + chance_of_factor(s)))) continue;
-    lines.push_back(
-        fmt::format("Residuals of {} ({}) are {:.1f} times as large as the stated sigmas predict: some observations "
-                    "are wrong, or the sigmas are too small{}",
-                    name_of(kind), s.count, factor,
-                    !estimates_sigma(kind) ? ""
-                    : estimated            ? "; the adjustment used estimated sigmas ('merge: {estimate_sigmas: true}')"
-                                : "; 'merge: {estimate_sigmas: true}' estimates these sigmas from the residuals"));
+    lines.push_back(fmt::format(
+        "Residuals of {} ({}) are {:.1f} times as large as the stated sigmas predict: some observations "
+        "are wrong, or the sigmas are too small{}",
+        name_of(kind), s.count, factor,
+        !estimated && s.scale > 1 ? fmt::format("; the adjustment used the stated sigmas times {:.1f} ('merge: "
+                                                "{{scale_contradicted_sigmas: false}}' keeps the stated ones)",
+                                                s.scale)
+        : !estimates_sigma(kind)  ? ""
+        : estimated               ? "; the adjustment used estimated sigmas ('merge: {estimate_sigmas: true}')"
+                                  : "; 'merge: {estimate_sigmas: true}' estimates these sigmas from the residuals"));
   }
   return lines;
 }
@@ -341,6 +354,91 @@ std::vector<std::string> contradicted_texts(const BlockResult& result, const rep
   for (const std::string& text :
        {contradicted_text(result, figures.positions, kHeldPositionSigma, "positions", 1, "m"),
         contradicted_text(result, figures.attitudes, kHeldAttitudeSigma, "attitudes", kDegreesPerRadian, "degrees")})
+    if (!text.empty()) lines.push_back(text);
+  return lines;
+}
+
+namespace {
+
+// A control or check point, with its difference from the given position.
+struct WrongPoint {
+  const ControlPoint* point = nullptr;
+  double sigmas = 0, metres = 0, worst_px = 0;
+};
+
+// The length of adjusted - given over the sigmas of the adjustment, on the axes that are given. A check point's own
+// covariance counts too.
+WrongPoint difference_of(const BlockResult& result, const ControlPoint& given,
+                         const BlockResult::ControlResult& control) {
+  WrongPoint wrong{&given};
+  const Eigen::Vector3d sigma = used_sigma(result, given);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double difference = control.adjusted[axis] - given.position[axis];
+    double variance = sigma[axis] * sigma[axis];
+    if (given.role == PointRole::kCheck) variance += control.covariance(axis, axis);
+    if (!std::isfinite(difference) || !std::isfinite(variance)) continue;
+    wrong.sigmas = std::hypot(wrong.sigmas, difference / std::sqrt(variance));
+    wrong.metres = std::hypot(wrong.metres, difference);
+  }
+  for (std::size_t m = 0; m < std::min(given.measurements.size(), control.residual_px.size()); ++m)
+    if (control.takes_part(m)) wrong.worst_px = std::max(wrong.worst_px, control.residual_px[m].norm());
+  return wrong;
+}
+
+std::string wrong_points_text(const BlockResult& result, PointRole role) {
+  std::vector<WrongPoint> wrong;
+  std::int64_t compared = 0;
+  for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
+    const ControlPoint& given = result.block.control_points[p];
+    if (given.role != role || !result.control[p].takes_part()) continue;
+    ++compared;
+    const WrongPoint point = difference_of(result, given, result.control[p]);
+    if (point.sigmas > kContradicted) wrong.push_back(point);
+  }
+  if (wrong.empty()) return "";
+  std::stable_sort(wrong.begin(), wrong.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
+  const bool one = wrong.size() == 1, control = role == PointRole::kControl;
+  std::string text = fmt::format("{} of {} {} differ{} from the block by more than {:.0f} sigmas{}: ", wrong.size(),
+                                 compared, control ? "control points" : "check points", one ? "s" : "", kContradicted,
+                                 control ? (one ? " and has hardly any weight" : " and have hardly any weight") : "");
+  for (std::size_t i = 0; i < std::min(kNamed, wrong.size()); ++i)
+    text += fmt::format("{}{} by {:.{}f} m (its marks fit within {} px)", i > 0 ? ", " : "", wrong[i].point->name,
+                        wrong[i].metres, wrong[i].metres < 10 ? 3 : 1, pixels(wrong[i].worst_px));
+  if (wrong.size() > kNamed) text += fmt::format(" and {} more", wrong.size() - kNamed);
+  return text + (one ? "; check its coordinates and its name" : "; check their coordinates and names");
+}
+
+std::string rejected_marks_text(const BlockResult& result) {
+  struct Mark {
+    std::string place;
+    double px = 0;
+  };
+  std::vector<Mark> marks;
+  for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
+    const ControlPoint& given = result.block.control_points[p];
+    const BlockResult::ControlResult& control = result.control[p];
+    if (!control.takes_part()) continue;
+    for (std::size_t m = 0; m < std::min(given.measurements.size(), control.residual_px.size()); ++m)
+      if (!control.takes_part(m) && control.residual_px[m].allFinite())
+        marks.push_back(
+            {given.name + " in " + result.block.name_of(given.measurements[m].image), control.residual_px[m].norm()});
+  }
+  if (marks.empty()) return "";
+  std::stable_sort(marks.begin(), marks.end(), [](const auto& a, const auto& b) { return a.px > b.px; });
+  std::string text = fmt::format("{} of control and check points {} rejected: ", counted(std::ssize(marks), "mark"),
+                                 marks.size() == 1 ? "is" : "are");
+  for (std::size_t i = 0; i < std::min(kNamed, marks.size()); ++i)
+    text += fmt::format("{}{} by {} px", i > 0 ? ", " : "", marks[i].place, pixels(marks[i].px));
+  if (marks.size() > kNamed) text += fmt::format(" and {} more", marks.size() - kNamed);
+  return text;
+}
+
+}  // namespace
+
+std::vector<std::string> wrong_control_texts(const BlockResult& result) {
+  std::vector<std::string> lines;
+  for (const std::string& text : {wrong_points_text(result, PointRole::kControl),
+                                  wrong_points_text(result, PointRole::kCheck), rejected_marks_text(result)})
     if (!text.empty()) lines.push_back(text);
   return lines;
 }
@@ -378,6 +476,7 @@ std::vector<std::string> remarks(const BlockResult& result, const report::Figure
   for (std::string& text : misstated_texts(result)) lines.push_back(std::move(text));
   for (std::string& text : contradicted_texts(result, figures)) lines.push_back(std::move(text));
   if (std::string text = near_limit_text(result, figures); !text.empty()) lines.push_back(std::move(text));
+  for (std::string& text : wrong_control_texts(result)) lines.push_back(std::move(text));
   for (const PointRole role : {PointRole::kControl, PointRole::kCheck})
     if (std::string text = unused_points_text(result, role); !text.empty()) lines.push_back(std::move(text));
   return lines;

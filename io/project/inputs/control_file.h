@@ -27,8 +27,6 @@
 
 namespace megablock {
 
-inline constexpr double kUnknownHeightSigma = 1000;  // metres; so large that the height is practically free
-
 // The contents of a file: coordinates in the system `crs`, images by name.
 struct ControlTable {
   struct Measurement {

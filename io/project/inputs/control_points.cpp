@@ -7,6 +7,7 @@
 #include <set>
 
 #include "io/base/error.h"
+#include "io/block/held_priors.h"
 #include "io/project/inputs/control_file.h"
 
 namespace megablock {

@@ -231,5 +231,35 @@ TEST(Remarks, PointsThatAreNotSeenAndTheWorstFirst) {
   EXPECT_EQ(unused_points_text(result, PointRole::kControl), "");
 }
 
+// A wrong coordinate, and a mark that was rejected while the point takes part.
+TEST(Remarks, NamesWrongControlAndRejectedMarks) {
+  BlockResult result = made_up_result(small_block());
+  EXPECT_TRUE(wrong_control_texts(result).empty());
+  std::vector<std::size_t> control;
+  for (std::size_t p = 0; p < result.control.size(); ++p)
+    if (result.block.control_points[p].role == PointRole::kControl) control.push_back(p);
+  ASSERT_GE(control.size(), 2u);
+  ControlPoint& moved = result.block.control_points[control[0]];
+  moved.name = "nail";
+  moved.position = result.control[control[0]].adjusted + Eigen::Vector3d(6, 0, 8);
+  moved.sigma.setConstant(0.02);
+  for (auto& residual : result.control[control[0]].residual_px) residual = {0.3, 0.4};
+  ControlPoint& marked = result.block.control_points[control[1]];
+  marked.name = "cross";
+  BlockResult::ControlResult& seen = result.control[control[1]];
+  ASSERT_GE(seen.residual_px.size(), 2u);
+  seen.kept.assign(seen.residual_px.size(), 1);
+  seen.kept[1] = 0;
+  seen.residual_px[1] = {-300, 400};
+  EXPECT_THAT(wrong_control_texts(result),
+              testing::ElementsAre("1 of " + std::to_string(control.size()) +
+                                       " control points differs from the block by more than 6 sigmas and has hardly "
+                                       "any weight: nail by 10.0 m (its marks fit within 0.5 px); check its "
+                                       "coordinates and its name",
+                                   "1 mark of control and check points is rejected: cross in " +
+                                       result.block.name_of(marked.measurements[1].image) + " by 500 px"));
+  EXPECT_THAT(report_html(result), HasSubstr("<li class=look>1 mark of control and check points is rejected"));
+}
+
 }  // namespace
 }  // namespace megablock

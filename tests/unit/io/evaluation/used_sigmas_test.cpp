@@ -1,0 +1,23 @@
+#include "io/evaluation/used_sigmas.h"
+
+#include <gtest/gtest.h>
+
+namespace megablock {
+namespace {
+
+TEST(UsedSigmas, AreTheStatedOnesTimesTheFactorsOfTheResult) {
+  BlockResult result;
+  ControlPoint point;
+  point.sigma = {0.01, 0.02, 0.03};
+  PositionPrior prior;
+  prior.sigma = {1, 2, 4};
+  EXPECT_EQ(used_sigma(result, point), point.sigma);
+  EXPECT_EQ(used_sigma(result, prior), prior.sigma);
+  result.observation_table[ObservationKind::kControlHorizontal].scale = 10;
+  result.observation_table[ObservationKind::kPositionHeight].scale = 5;
+  EXPECT_TRUE(used_sigma(result, point).isApprox(Eigen::Vector3d(0.1, 0.2, 0.03)));
+  EXPECT_TRUE(used_sigma(result, prior).isApprox(Eigen::Vector3d(1, 2, 20)));
+}
+
+}  // namespace
+}  // namespace megablock
