@@ -123,9 +123,9 @@ class MotionSummation {
     // A control point resists the movement of the ground itself: (S_X / sigma)'(S_X / sigma) is added to M.
     for (const auto& term : problem_.point_priors) {
       if (!problem_.active(term.point.value)) continue;
-      const Matrix37 r = term.sigma.cwiseInverse().asDiagonal() *
-                         moved(state_.points[static_cast<std::size_t>(term.point.value)], reference_);
-      motion_ += r.transpose() * r;
+      const Eigen::Vector3d& point = state_.points[static_cast<std::size_t>(term.point.value)];
+      const Matrix37 r = term.sigma.cwiseInverse().asDiagonal() * moved(point, reference_);
+      motion_ += weight_of(loss_of(problem_, term), point_prior_residual(point, term)) * r.transpose() * r;
     }
     sums_.known = sums_.all = motion_;
   }

@@ -51,6 +51,7 @@ void ObservationOptions::check() const {
   require_within(image_sigma_px, kSigmaPx, "image_sigma_px");
   require_within(image_loss.scale, kInSigmas, "image_loss_scale");
   require_within(position_loss.scale, kInSigmas, "position_loss_scale");
+  require_within(control_loss.scale, kInSigmas, "control_loss_scale");
   require_within(attitude_loss.scale, kInSigmas, "attitude_loss_scale");
   require_within(relative_loss.scale, kInSigmas, "relative_loss_scale");
   require_within(line_loss.scale, kInSigmas, "line_loss_scale");

@@ -11,8 +11,8 @@
 //   mount prior      Log(R R_0'), C - C_0                                                                [6]
 //   line             off the vertical, or the horizontal (line_terms.h)                                 [1]
 //   vertical         direction of down in an image, expected - seen (vertical_terms.h)                   [2]
-// Robust losses act on image residuals (all), position and attitude priors, relative poses, lines and verticals (each
-// with an option of its own).
+// Robust losses act on image residuals (all), position, control and attitude priors, relative poses, lines and
+// verticals (each with an option of its own).
 //
 // Unknowns: frames (6, pose_update), free intrinsics (camera_free), free mounts (6), points (3). Every table is
 // ascending by the index in the block; a local index is a row of its table.
@@ -159,7 +159,7 @@ struct TileProblem {
   std::vector<VerticalTerm> verticals;
   std::map<std::string, std::vector<MeasuredTerm>> measured;  // by the key of their type
 
-  RobustLoss image_loss, position_loss, attitude_loss, relative_loss, line_loss, vertical_loss;
+  RobustLoss image_loss, position_loss, control_loss, attitude_loss, relative_loss, line_loss, vertical_loss;
 
   std::int64_t point_count() const { return static_cast<std::int64_t>(points.size()); }
   std::int64_t observation_count() const { return static_cast<std::int64_t>(image.size()); }
@@ -182,13 +182,15 @@ struct TileState {
 };
 
 // A loss acts on the length of a residual of n numbers. Of good observations, the share beyond 3 sigmas is 0.3 % for
-// one number (lines), 1.1 % for two (images, verticals) and 2.9 % for three (positions, attitudes). With the corner at
-// three sigmas, nearly all good observations therefore keep the weight 1. docs/developer/decisions.md tells why
-// attitudes have Cauchy's tail ("Sigmas") and verticals Cauchy's loss ("Verticals").
+// one number (lines), 1.1 % for two (images, verticals) and 2.9 % for three (positions, control, attitudes). With the
+// corner at three sigmas, nearly all good observations therefore keep the weight 1. docs/developer/decisions.md tells
+// why attitudes have Cauchy's tail ("Sigmas"), positions and control too ("A wrong position or control point"), and
+// verticals Cauchy's loss ("Verticals").
 struct ObservationOptions {
   double image_sigma_px = 0.5;  // a-priori sigma of a tie point observation per axis, px
   RobustLoss image_loss{RobustLoss::Kind::kHuber, 3.0};
-  RobustLoss position_loss{RobustLoss::Kind::kHuber, 3.0};
+  RobustLoss position_loss{RobustLoss::Kind::kCauchyTail, 3.0};
+  RobustLoss control_loss{RobustLoss::Kind::kCauchyTail, 3.0};  // of the coordinates of control points
   RobustLoss attitude_loss{RobustLoss::Kind::kCauchyTail, 3.0};
   RobustLoss relative_loss{RobustLoss::Kind::kNone, 1.0};
   RobustLoss line_loss{RobustLoss::Kind::kHuber, 3.0};

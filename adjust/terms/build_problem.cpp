@@ -51,6 +51,7 @@ class TileBuilder {
     problem_.image_sigma_px = options_.image_sigma_px;
     problem_.image_loss = options_.image_loss;
     problem_.position_loss = options_.position_loss;
+    problem_.control_loss = options_.control_loss;
     problem_.attitude_loss = options_.attitude_loss;
     problem_.relative_loss = options_.relative_loss;
     problem_.line_loss = options_.line_loss;

@@ -1,10 +1,11 @@
 // Defines the terms for given coordinates of control points: r = (X - X_0) / sigma, metres; an axis of infinite sigma
-// is free.
+// is free. A control point that is held has no loss, which would release it.
 //
 // The tile of the point owns the prior, and eliminates it with the point (merge/tile/point_equations.h): normal
 // equations and datum take it from the point. The prior of a point that takes no part does not count.
 #include "adjust/terms/automatic_terms.h"
 #include "adjust/terms/linearise.h"
+#include "adjust/terms/prior_loss.h"
 #include "adjust/terms/terms.h"
 
 namespace megablock {
@@ -30,7 +31,16 @@ class PointPriors final : public ObservationType {
     // No block of derivatives: the point takes its equations from the prior itself.
     out.number = static_cast<int>(term.sigma.array().isFinite().count());
     out.kinds = {kControlHorizontal, kControlHorizontal, kControlHeight};
+    out.loss = loss_of(problem, term);
     visit(out);
+  }
+  RobustLoss loss(const TileProblem& problem, std::size_t row) const override {
+    return loss_of(problem, problem.point_priors[row]);
+  }
+  void scale_sigmas(TileProblem& problem, const SigmaScales& scales) const override {
+    const double horizontal = scales[kControlHorizontal];
+    for (TileProblem::PointTerm& term : problem.point_priors)
+      if (!held(term)) term.sigma.array() *= Eigen::Array3d(horizontal, horizontal, scales[kControlHeight]);
   }
   ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const override {
     return automatic_term<3, 3>(residual::PointKnown{problem.point_priors[row]});

@@ -59,7 +59,8 @@ class Positions final : public ObservationType {
     // own.
     const double horizontal = scales[kPositionHorizontal];
     for (TileProblem::PositionTerm& term : problem.positions)
-      term.prior.sigma.array() *= Eigen::Array3d(horizontal, horizontal, scales[kPositionHeight]);
+      if (!held(term.prior))
+        term.prior.sigma.array() *= Eigen::Array3d(horizontal, horizontal, scales[kPositionHeight]);
   }
   ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const override {
     return automatic_term<3, kPoseBlock>(residual::PositionMeasured{problem.positions[row].prior});

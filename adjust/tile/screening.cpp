@@ -74,7 +74,7 @@ class PointSettler {
     } else if (!settle_by_parts(p, threshold)) {
       // A single ray has no set to be consistent with. It is tested against the position that the prior holds.
       if (prior_[p] && before.allFinite() && views_.size() == 1)
-        kept_[0] = residuals_[0] <= threshold;
+        test_against_prior(p, threshold);
       else
         std::fill(kept_.begin(), kept_.end(), 0);
     }
@@ -141,6 +141,24 @@ class PointSettler {
     kept_ = part->passing;
     state_.points[p] = part->point;
     return true;
+  }
+
+  // Tests the only ray of a control point against its coordinates, with the sigmas of both: r = x - f(P) has the
+  // covariance C = sigma^2 I + J S J'. A ray that passes moves the point to the optimum of both, P + S J'C^-1 r.
+  void test_against_prior(std::int64_t p, double threshold) {
+    const TileProblem::PointTerm& term = *prior_[p];
+    kept_[0] = residuals_[0] <= threshold;
+    if (kept_[0] || !term.sigma.allFinite()) return;
+    const PointView& view = views_[0];
+    const ProjectionJacobian there = project_with_jacobian(*view.intrinsics, to_inside(view.camera, term.position));
+    if (!there.valid) return;
+    const Eigen::Vector2d r = view.inverse_sigma * pixel_difference(*view.intrinsics, view.pixel, there.pixel);
+    const Eigen::Matrix<double, 2, 3> by_point =
+        view.inverse_sigma * (there.by_point * view.camera.rotation.toRotationMatrix());
+    const Eigen::Matrix<double, 3, 2> gain = term.sigma.cwiseAbs2().asDiagonal() * by_point.transpose();
+    const Eigen::Vector2d solved = (Eigen::Matrix2d::Identity() + by_point * gain).inverse() * r;
+    kept_[0] = r.dot(solved) <= threshold * threshold;
+    if (kept_[0]) state_.points[p] = term.position + gain * solved;
   }
 
   // Rejects rays that meet at too small an angle, because they do not fix the distance of the point.

@@ -33,6 +33,7 @@
 #include "adjust/tile/image_sigma.h"
 #include "adjust/tile/lost_frames.h"
 #include "adjust/tile/lost_parts.h"
+#include "adjust/tile/prior_scales.h"
 #include "io/base/error.h"
 #include "io/text/plausible.h"
 
@@ -118,6 +119,7 @@ class TileAdjuster {
   }
 
   AdjustSummary run() {
+    if (options_.only_start) set_losses_from_afar(problem_, options_.observations);
     approach();
     recover();
     for (int round = 0; round + 1 < options_.screening_rounds; ++round) {
@@ -302,15 +304,20 @@ class TileAdjuster {
       if (!chosen_[p])
         std::fill(problem_.kept.begin() + problem_.begin[p], problem_.kept.begin() + problem_.begin[p + 1], 0);
     const RobustLoss loss = problem_.image_loss, attitude_loss = problem_.attitude_loss;
+    const RobustLoss position_loss = problem_.position_loss, control_loss = problem_.control_loss;
     // Cauchy's scale of s sigmas makes the loss as wide as the residuals are. A narrower one has several minima while
     // the tile is metres away from its optimum (docs/developer/decisions.md, "Tiles on their own").
     problem_.image_loss = {RobustLoss::Kind::kCauchy, std::max(2.0, robust_sigma(problem_, state_, options_))};
     problem_.attitude_loss = attitude_loss.from_afar();
+    problem_.position_loss = position_loss.from_afar();
+    problem_.control_loss = control_loss.from_afar();
     // The tolerance of the head, with k = 0.5 and the observations that take part here.
     const double near = 0.5 * kNear * kNear * frame_unknowns() / static_cast<double>(active_observations());
     solve({std::min(iterations, options_.max_iterations), std::max(kFlat, near), camera_free(stage)});
     problem_.image_loss = loss;
     problem_.attitude_loss = attitude_loss;
+    problem_.position_loss = position_loss;
+    problem_.control_loss = control_loss;
     problem_.kept = all;
   }
 

@@ -74,6 +74,7 @@ void describe(OptionVisitor& visit, ObservationOptions& o) {
   visit.number("image_sigma_px", o.image_sigma_px);
   describe_loss(visit, "image_loss", o.image_loss);
   describe_loss(visit, "position_loss", o.position_loss);
+  describe_loss(visit, "control_loss", o.control_loss);
   describe_loss(visit, "attitude_loss", o.attitude_loss);
   describe_loss(visit, "relative_loss", o.relative_loss);
   describe_loss(visit, "line_loss", o.line_loss);
@@ -117,6 +118,7 @@ void describe(OptionVisitor& visit, MergeSettings& o) {
   visit.number("decrement", o.decrement);
   visit.integer("screening_rounds", o.screening_rounds);
   visit.flag("estimate_sigmas", o.estimate_sigmas);
+  visit.flag("scale_contradicted_sigmas", o.scale_contradicted_sigmas);
   visit.flag("scale_sigma", o.scale_sigma);
 }
 

@@ -31,6 +31,9 @@ struct MergeSettings {
   // Estimates the sigmas of positions, attitudes and relative poses from their residuals (adjust/tile/sigma_scales.h),
   // in at most ten adjustments.
   bool estimate_sigmas = false;
+  // Multiplies the sigmas of positions and control points that the block contradicts by a factor of three and more
+  // (adjust/tile/prior_scales.h).
+  bool scale_contradicted_sigmas = true;
   bool scale_sigma = false;  // posterior sigmas multiplied by the a-posteriori sigma
   void check() const;        // throws InputError
 };

@@ -58,6 +58,12 @@ class TileStore {
     save(row);
   }
 
+  // Calls change(RankTile&) on the part of the tile that is always in memory, and stores nothing.
+  template <typename Change>
+  void change_outline(std::size_t row, Change&& change) {
+    change(slots_[row].tile);
+  }
+
   // Stores the state after a step beside the present one. accept() or reject() then decides on the states of all tiles.
   // The trial of every tile must be put before accept().
   void put_trial(std::size_t row, TileState trial);

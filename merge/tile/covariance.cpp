@@ -15,6 +15,7 @@
 // do not depend on how a free datum is held, because a similarity changes no residual.
 #include <limits>
 
+#include "adjust/terms/prior_loss.h"
 #include "merge/plan/tree_workers.h"
 #include "merge/plan/unknowns.h"
 #include "merge/tile/condense.h"
@@ -137,11 +138,12 @@ class CellCovariances {
     if (row < 0) return;
     const auto& term = problem_.point_priors[at(row)];
     const Eigen::Vector3d residual = point_prior_residual(state_.points[at(point)], term);
+    const double weight = loss_of(problem_, term).evaluate(residual.squaredNorm())[1];
     for (int axis = 0; axis < 3; ++axis) {
       if (std::isinf(term.sigma[axis])) continue;
-      const double variance = covariance(axis, axis) / (term.sigma[axis] * term.sigma[axis]);
+      const double variance = weight * covariance(axis, axis) / (term.sigma[axis] * term.sigma[axis]);
       (*observations_)[axis < 2 ? ObservationKind::kControlHorizontal : ObservationKind::kControlHeight].add(
-          residual[axis] * residual[axis], 1 - variance);
+          weight * residual[axis] * residual[axis], 1 - variance);
     }
   }
 

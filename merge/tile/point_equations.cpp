@@ -19,6 +19,7 @@
 #include <map>
 #include <utility>
 
+#include "adjust/terms/prior_loss.h"
 #include "merge/plan/unknowns.h"
 
 namespace megablock {
@@ -143,7 +144,7 @@ std::size_t PointEquations::linearise(std::span<const std::int32_t> points, cons
   for (Point& point : points_) weigh(point, sweep.curvature);
   kernels_->normal(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), records_.data());
   if (sights_ < lanes_.size()) kernels_->merge(lanes_.size(), sight_of_lane_.data(), records_.data());
-  sum_up();
+  sum_up(sweep.curvature);
   kernels_->factorise(padded_points(), sweep.lambda, kPivotTolerance * (1 + sweep.lambda), sums_.data(),
                       {point_values_.data(), lanes_.capacity()}, steps_.data());
   return points_.size();
@@ -345,29 +346,33 @@ void PointEquations::add_to_shared(std::int64_t unknown, int dimension, const do
 }
 
 // Sums V and b of the points, and adds their priors.
-void PointEquations::sum_up() {
+void PointEquations::sum_up(bool curvature) {
   for (std::size_t i = 0; i < points_.size(); ++i) begin_[i] = points_[i].first_sight;
   begin_[points_.size()] = sights_;
   kernels_->sum(std::ssize(points_), begin_.data(), records_.data(), sums_.data());
   std::fill(sums_.data() + std::ssize(points_) * kRecordSize, sums_.data() + padded_points() * kRecordSize, 0.0);
   for (std::size_t i = 0; i < points_.size(); ++i)
-    if (prior_[at(points_[i].point)] >= 0) add_prior(i);
+    if (prior_[at(points_[i].point)] >= 0) add_prior(i, curvature);
 }
 
-void PointEquations::add_prior(std::size_t i) {
+void PointEquations::add_prior(std::size_t i, bool curvature) {
   Point& point = points_[i];
   const auto& term = problem_.point_priors[at(prior_[at(point.point)])];
-  const Eigen::Vector3d weight = term.sigma.cwiseInverse();  // 0 on a free axis
+  const Eigen::Vector3d inverse_sigma = term.sigma.cwiseInverse();  // 0 on a free axis
   const Eigen::Vector3d r = point_prior_residual(state_.points[at(point.point)], term);
+  const LossWeight weight(loss_of(problem_, term), r.squaredNorm(), curvature);
+  const Eigen::Matrix3d jacobian = weight.weighted(Eigen::Matrix3d(inverse_sigma.asDiagonal()), r);
+  const Eigen::Matrix3d v = jacobian.transpose() * jacobian;
+  const Eigen::Vector3d b = -weight.residual_scale * (jacobian.transpose() * r);
   double* sums = sums_.data() + static_cast<std::int64_t>(i) * kRecordSize;
-  constexpr int kOnDiagonal[3] = {kV, kV + 2, kV + 5};
-  for (int k = 0; k < 3; ++k) {
-    sums[kOnDiagonal[k]] += weight[k] * weight[k];
-    sums[kB + k] -= weight[k] * r[k];
+  int entry = kV;  // of the lower triangle, row by row
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column <= row; ++column) sums[entry++] += v(row, column);
+    sums[kB + row] += b[row];
   }
-  point.rho += r.squaredNorm();
-  point.weighted_squares += r.squaredNorm();
-  point.residual_count += (weight.array() > 0).count();
+  point.rho += weight.rho;
+  point.weighted_squares += weight.first * r.squaredNorm();
+  point.residual_count += (inverse_sigma.array() > 0).count();
 }
 
 // Kernels work on whole groups of lanes. The lanes behind the last group of observations add to a sum that nobody

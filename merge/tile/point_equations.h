@@ -172,8 +172,8 @@ class PointEquations {
   void add_shared(const ImageUnknowns& unknowns, const ImageView& view, const CameraResidual& r, std::int64_t lane,
                   Point& point);
   void add_to_shared(std::int64_t unknown, int dimension, const double* w, int rows, Point& point);
-  void sum_up();
-  void add_prior(std::size_t i);
+  void sum_up(bool curvature);
+  void add_prior(std::size_t i, bool curvature);
   std::int64_t padded_points() const { return lane_kernels::padded(std::ssize(points_)); }
   double& point_value(int v, std::size_t i) {
     return point_values_.data()[v * lanes_.capacity() + static_cast<std::int64_t>(i)];

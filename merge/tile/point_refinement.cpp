@@ -1,5 +1,5 @@
-// Minimises the cost of a point X at held poses, with its residuals r_k and their derivatives J_k by X (prior included,
-// without a loss), s = |r_k|^2:
+// Minimises the cost of a point X at held poses, with its residuals r_k and their derivatives J_k by X (prior
+// included), s = |r_k|^2:
 //
 //     f(X) = 1/2 sum rho(s),   b = -f' = -sum rho' J'r,   f'' ~ sum rho' J'J + 2 rho'' (J'r)(J'r)'
 //
@@ -24,6 +24,7 @@
 
 #include "adjust/lanes/residual_squares.h"
 #include "adjust/lanes/tile_cost.h"
+#include "adjust/terms/prior_loss.h"
 #include "geometry/intersection/triangulation.h"
 #include "geometry/numbers/decompositions.h"
 #include "geometry/threads/workers.h"
@@ -53,25 +54,28 @@ struct PointCost {
   }
 
   void add(const RobustLoss& loss, const Eigen::Vector2d& residual, const Eigen::Matrix<double, 2, 3>& by_point) {
-    const double squares = residual.squaredNorm();
-    if (!std::isfinite(squares)) {
+    if (residual.allFinite())
+      add_to(images, loss, residual, by_point);
+    else
       images = std::numeric_limits<double>::infinity();
-      return;
-    }
+  }
+  void add_prior(const RobustLoss& loss, const TileProblem::PointTerm& term, const Eigen::Vector3d& position) {
+    add_to(prior, loss, point_prior_residual(position, term), Eigen::Matrix3d(term.sigma.cwiseInverse().asDiagonal()));
+  }
+
+ private:
+  template <int Size>
+  void add_to(double& part, const RobustLoss& loss, const Eigen::Matrix<double, Size, 1>& residual,
+              const Eigen::Matrix<double, Size, 3>& by_point) {
+    const double squares = residual.squaredNorm();
     const auto rho = loss.evaluate(squares);
     const Eigen::Vector3d along = by_point.transpose() * residual;
     const Eigen::Matrix3d normal = rho[1] * (by_point.transpose() * by_point);
-    images += 0.5 * rho[0];
+    part += 0.5 * rho[0];
     b -= rho[1] * along;
     reweighted += normal;
     curved += normal;
     if (rho[2] < 0) curved += std::max(2 * rho[2], -rho[1] / squares) * (along * along.transpose());
-  }
-  void add_prior(const TileProblem::PointTerm& term, const Eigen::Vector3d& position) {
-    const Eigen::Vector3d weight = term.sigma.cwiseInverse(), r = point_prior_residual(position, term);
-    prior += 0.5 * r.squaredNorm();
-    b -= weight.cwiseProduct(r);
-    for (Eigen::Matrix3d* normal : {&reweighted, &curved}) normal->diagonal() += weight.cwiseAbs2();
   }
 };
 
@@ -101,7 +105,7 @@ class PointCosts {
         if (lanes_.size() == ObservationLanes::kUsual) flush(trials, costs);
       }
       if (const std::int64_t i = prior_[static_cast<std::size_t>(point)]; i >= 0)
-        costs[t].add_prior(problem_.point_priors[static_cast<std::size_t>(i)], position);
+        add_prior(problem_.point_priors[static_cast<std::size_t>(i)], position, costs[t]);
     }
     flush(trials, costs);
   }
@@ -112,6 +116,9 @@ class PointCosts {
     std::int64_t row;
   };
 
+  void add_prior(const TileProblem::PointTerm& term, const Eigen::Vector3d& position, PointCost& cost) const {
+    cost.add_prior(loss_of(problem_, term), term, position);
+  }
   void flush(std::span<const Trial> trials, std::vector<PointCost>& costs) {
     lanes_.linearise();
     for (std::int64_t lane = 0; lane < lanes_.size(); ++lane) {

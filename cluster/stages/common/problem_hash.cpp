@@ -60,7 +60,7 @@ void add_other_terms(Hasher& hasher, const TileProblem& p) {
     for (const auto& term : rows) hasher.add(term.from.value).add(term.to.value).add(term.value).add(term.sigma);
   }
   for (const RobustLoss& loss :
-       {p.image_loss, p.position_loss, p.attitude_loss, p.relative_loss, p.line_loss, p.vertical_loss})
+       {p.image_loss, p.position_loss, p.control_loss, p.attitude_loss, p.relative_loss, p.line_loss, p.vertical_loss})
     hasher.add(loss.kind).add(loss.scale);
 }
 

@@ -56,9 +56,11 @@ std::vector<std::int64_t> observation_counts(const Job& job, const MergeInputs& 
   return counts;
 }
 
-int most_rounds(const MergeSettings& settings) {
-  constexpr int kSigmaRounds = 10;
-  return settings.estimate_sigmas ? std::max(settings.screening_rounds, kSigmaRounds) : settings.screening_rounds;
+// Estimated and scaled sigmas change the weights, so that they need rounds of their own to settle.
+int most_rounds(const MergeSettings& settings, const SigmaScales& scales) {
+  constexpr int kSigmaRounds = 10, kScaleRounds = 1;
+  if (settings.estimate_sigmas) return std::max(settings.screening_rounds, kSigmaRounds);
+  return settings.screening_rounds + (scales.matter() ? kScaleRounds : 0);
 }
 
 // Clears the scratch folder of the job. The folder itself stays, because another disk may be mounted there. Folders of
@@ -79,14 +81,16 @@ void clear_scratch(const Job& job, bool use) {
 
 // Only the last round iterates to the end. The rounds before it only lead to decisions on observations and to sigmas. A
 // mean of a hundredth of a sigma of the frames' unknowns is enough for these: chi-square is then off by 1e-4 of their
-// number.
-GlobalOptions options_of(const MergeSettings& settings, std::size_t frames, bool last) {
+// number. A round between the first and the last starts near its end. Where it does not get there in a few iterations,
+// most positions or control points are beyond the corners of their losses, and larger sigmas are what it needs.
+GlobalOptions options_of(const MergeSettings& settings, std::size_t frames, bool near, bool last) {
   constexpr double kSettled = 0.01;
+  constexpr int kFew = 4;
   const double settled = kSettled * std::sqrt(6 * static_cast<double>(frames));
   GlobalOptions options;
   options.max_decrement = last ? settings.decrement : std::max(settings.decrement, settled);
   options.confirm = last;
-  options.max_iterations = settings.max_iterations;
+  options.max_iterations = near && !last ? std::min(kFew, settings.max_iterations) : settings.max_iterations;
   return options;
 }
 
@@ -130,7 +134,7 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
       distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
   const std::optional<MergePosition> found = checkpoint.find();
   const MergePosition start =
-      found ? *found : MergePosition{0, 0, start_global(options_of(job.settings.merge, frames, false)), {}};
+      found ? *found : MergePosition{0, 0, start_global(options_of(job.settings.merge, frames, false, false)), {}};
   const MemoryOptions memory = memory_of_rank(job);
   SweepRecorder recorder(memory.scratch, job.options.record_s, stop_requested);
   const std::optional<MergePosition> within = checkpoint.find_sweep(start, recorder);
@@ -147,8 +151,10 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
   recorder.set_position([&] { return checkpoint.of_sweep(position); });
   std::int32_t saved = position.global.accepted;
   for (;;) {
-    const bool last = position.round >= most_rounds(job.settings.merge);
-    const GlobalOptions options = options_of(job.settings.merge, frames, last);
+    const bool last = position.round >= most_rounds(job.settings.merge, position.scales);
+    const bool near = last || position.round > 0;  // the first round has come from afar
+    const GlobalOptions options = options_of(job.settings.merge, frames, near, last);
+    set_losses(job, near, tiles);
     MergeTreeRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(memory, tiles));
     runner.record_sweeps(recorder);
     return_freed_memory();  // memory from which the plans were made
@@ -176,8 +182,10 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
     }
     bool changed = adopt_image_sigma(job, tiles, rank_of_tile.size(), block);
     if (job.settings.merge.estimate_sigmas) changed = adopt_sigma_scales(runner, tiles, position.scales) || changed;
+    if (job.settings.merge.scale_contradicted_sigmas && near)
+      changed = adopt_contradicted_scales(job, tiles, position.scales) || changed;
     changed = screen(job, tiles) > 0 || changed;
-    position.round = changed ? position.round + 1 : most_rounds(job.settings.merge);
+    position.round = changed ? position.round + 1 : most_rounds(job.settings.merge, position.scales);
     position.tried_steps += position.global.iterations;
     const std::int32_t accepted = position.global.accepted;
     position.global = start_global(options);

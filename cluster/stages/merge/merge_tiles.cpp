@@ -99,12 +99,47 @@ void follow(const BlockState& state, TileStore& tiles) {
         row, [&](RankTile& tile) { tile.state = make_tile_state(tile.problem, state, std::move(tile.state.points)); });
 }
 
-bool adopt_sigma_scales(MergeTreeRunner& runner, TileStore& tiles, SigmaScales& scales) {
-  const SigmaScales change = next_sigma_scales(scales, runner.posterior().observations);
-  if (!change.matter()) return false;
+void set_losses(const Job& job, bool near, TileStore& tiles) {
+  const ObservationOptions& options = job.settings.adjustment.observations;
+  for (std::size_t row = 0; row < tiles.size(); ++row)
+    tiles.change_outline(row, [&](RankTile& tile) {
+      near ? set_last_losses(tile.problem, options) : set_losses_from_afar(tile.problem, options);
+    });
+}
+
+namespace {
+
+void multiply_sigmas(const SigmaScales& change, TileStore& tiles, SigmaScales& scales) {
   for (std::size_t k = 0; k < kObservationKinds; ++k) scales.of[k] *= change.of[k];
   for (std::size_t row = 0; row < tiles.size(); ++row)
     tiles.change(row, [&](RankTile& tile) { scale_sigmas(tile.problem, change); });
+}
+
+}  // namespace
+
+bool adopt_contradicted_scales(const Job& job, TileStore& tiles, SigmaScales& scales) {
+  constexpr double kSettled = 1.2;  // a smaller change needs no further adjustment: a median of few is no better
+  PriorLengths lengths;
+  for (std::size_t row = 0; row < tiles.size(); ++row) {
+    const RankTile& tile = tiles.whole(row);
+    lengths.add(prior_lengths(tile.problem, tile.state));
+  }
+  // Those have factors from variance components.
+  if (job.settings.merge.estimate_sigmas) lengths.position_horizontal = lengths.position_height = {};
+  ByteWriter writer;
+  writer.value(lengths);
+  PriorLengths all;
+  for (const Bytes& bytes : job.ranks.gather_all(writer.take())) all.add(ByteReader(bytes).value<PriorLengths>());
+  const SigmaScales change = contradicted_sigma_scales(scales, all);
+  if (std::ranges::all_of(change.of, [](double f) { return f < kSettled && f > 1 / kSettled; })) return false;
+  multiply_sigmas(change, tiles, scales);
+  return true;
+}
+
+bool adopt_sigma_scales(MergeTreeRunner& runner, TileStore& tiles, SigmaScales& scales) {
+  const SigmaScales change = next_sigma_scales(scales, runner.posterior().observations);
+  if (!change.matter()) return false;
+  multiply_sigmas(change, tiles, scales);
   return true;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "adjust/tile/prior_scales.h"
 #include "adjust/tile/sigma_scales.h"
 #include "cluster/job/job.h"
 #include "cluster/stages/merge/merge_start.h"
@@ -33,6 +34,12 @@ BlockState gather_state(const Job& job, const BlockState& start, const TileStore
 
 // Gives the present state to every tile, before its observations are tested against it.
 void follow(const BlockState& state, TileStore& tiles);
+
+// Gives the tiles the losses of the options, or those that pull from any distance (prior_scales.h).
+void set_losses(const Job& job, bool near, TileStore& tiles);
+// Collective. Multiplies the sigmas of positions and control points that are stated far too small (prior_scales.h).
+// Returns whether they have changed so much that another adjustment is needed.
+bool adopt_contradicted_scales(const Job& job, TileStore& tiles, SigmaScales& scales);
 
 // Collective. Whether the sigmas of positions, attitudes and relative poses have changed so much that another
 // adjustment is needed.

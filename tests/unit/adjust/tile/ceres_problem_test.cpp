@@ -52,6 +52,7 @@ TEST_F(CeresTileTest, HasOurCost) {
   for (const auto kind :
        {RobustLoss::Kind::kNone, RobustLoss::Kind::kHuber, RobustLoss::Kind::kCauchy, RobustLoss::Kind::kCauchyTail}) {
     tile_->problem.image_loss = tile_->problem.position_loss = tile_->problem.relative_loss = {kind, 2};
+    tile_->problem.control_loss = {kind, 0.5};
     const double ours = evaluate_cost(tile_->problem, tile_->state);
     ASSERT_FALSE(tile_->problem.relatives.empty());
     ASSERT_FALSE(tile_->problem.mount_priors.empty());

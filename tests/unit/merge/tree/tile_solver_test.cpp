@@ -167,6 +167,19 @@ TEST(TileSolver, LossesOfAllKinds) {
   }
 }
 
+// One of eight control points is off by two metres, where a centimetre is stated, and all others are as stated.
+TEST(TileSolver, LossOfControlPoints) {
+  SimulationOptions simulation = aerial_tile(11);
+  simulation.control_points = 8;
+  for (const auto kind : {RobustLoss::Kind::kHuber, RobustLoss::Kind::kCauchyTail}) {
+    Start start(simulation);
+    ASSERT_EQ(start.problem.point_priors.size(), 8u);
+    start.problem.point_priors[3].position.x() += 2;
+    start.problem.control_loss = {kind, 3};
+    expect_optimum_of_ceres(start);
+  }
+}
+
 // The tile's own adjustment estimates fewer intrinsics than the block.
 TEST(TileSolver, MasksOfIntrinsics) {
   const Start start(aerial_tile(7));

@@ -1,0 +1,99 @@
+#include "adjust/tile/prior_scales.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "adjust/terms/linearise.h"
+#include "adjust/terms/prior_loss.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr double kBinsPerDoubling = 8;
+constexpr double kFirstBin = -5;  // log2 of the start of the first bin
+constexpr double kMedianOfTwo = 1.1774, kMedianOfOne = 0.6745;
+constexpr double kFarTooSmall = 3;            // factor
+constexpr std::int64_t kFewestResiduals = 4;  // residuals of a kind: fewer have no median that stands an outlier
+
+void add_residual(const Eigen::Vector3d& residual, const Eigen::Vector3d& sigma, LengthCounts& horizontal,
+                  LengthCounts& height) {
+  if (sigma.head<2>().maxCoeff() < kUnknownHeightSigma) horizontal.add(residual.head<2>().norm());
+  if (sigma.z() < kUnknownHeightSigma) height.add(std::abs(residual.z()));
+}
+
+}  // namespace
+
+void LengthCounts::add(double length) {
+  const double bin = length > 0 ? kBinsPerDoubling * (std::log2(length) - kFirstBin) : 0;
+  ++counts_[static_cast<std::size_t>(std::clamp(bin, 0.0, kBins - 1.0))];
+}
+
+void LengthCounts::add(const LengthCounts& other) {
+  for (std::size_t i = 0; i < counts_.size(); ++i) counts_[i] += other.counts_[i];
+}
+
+std::int64_t LengthCounts::total() const { return std::accumulate(counts_.begin(), counts_.end(), std::int64_t{0}); }
+
+double LengthCounts::median() const {
+  const std::int64_t half = (total() + 1) / 2;
+  if (half == 0) return 0;
+  std::int64_t below = 0;
+  std::size_t bin = 0;
+  while ((below += counts_[bin]) < half) ++bin;
+  return std::exp2((static_cast<double>(bin) + 0.5) / kBinsPerDoubling + kFirstBin);
+}
+
+void PriorLengths::add(const PriorLengths& other) {
+  position_horizontal.add(other.position_horizontal);
+  position_height.add(other.position_height);
+  control_horizontal.add(other.control_horizontal);
+  control_height.add(other.control_height);
+}
+
+PriorLengths prior_lengths(const TileProblem& problem, const TileState& state) {
+  PriorLengths lengths;
+  for (const auto& term : problem.positions) {
+    if (held(term.prior)) continue;
+    const Pose& frame = state.frames[static_cast<std::size_t>(term.frame.value)];
+    add_residual(linearise_position(frame, term.prior).residual, term.prior.sigma, lengths.position_horizontal,
+                 lengths.position_height);
+  }
+  for (const auto& term : problem.point_priors) {
+    if (held(term) || !problem.active(term.point.value)) continue;
+    const Eigen::Vector3d& point = state.points[static_cast<std::size_t>(term.point.value)];
+    add_residual(point_prior_residual(point, term), term.sigma, lengths.control_horizontal, lengths.control_height);
+  }
+  return lengths;
+}
+
+SigmaScales contradicted_sigma_scales(const SigmaScales& now, const PriorLengths& lengths) {
+  using enum ObservationKind;
+  const std::int64_t numbers = 2 * (lengths.position_horizontal.total() + lengths.control_horizontal.total()) +
+                               lengths.position_height.total() + lengths.control_height.total();
+  const double redundancy = std::max(0.5, 1 - 7 / static_cast<double>(std::max<std::int64_t>(1, numbers)));
+  SigmaScales change;
+  const auto judge = [&](ObservationKind kind, const LengthCounts& counts, double usual) {
+    if (counts.total() < kFewestResiduals) return;
+    const double all = now[kind] * counts.median() / (usual * std::sqrt(redundancy));
+    change[kind] = (all < kFarTooSmall ? 1 : all) / now[kind];
+  };
+  judge(kPositionHorizontal, lengths.position_horizontal, kMedianOfTwo);
+  judge(kPositionHeight, lengths.position_height, kMedianOfOne);
+  judge(kControlHorizontal, lengths.control_horizontal, kMedianOfTwo);
+  judge(kControlHeight, lengths.control_height, kMedianOfOne);
+  return change;
+}
+
+void set_losses_from_afar(TileProblem& problem, const ObservationOptions& options) {
+  problem.position_loss = options.position_loss.from_afar();
+  problem.control_loss = options.control_loss.from_afar();
+}
+
+void set_last_losses(TileProblem& problem, const ObservationOptions& options) {
+  problem.position_loss = options.position_loss;
+  problem.control_loss = options.control_loss;
+}
+
+}  // namespace megablock

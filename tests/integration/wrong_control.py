@@ -1,0 +1,81 @@
+#!/usr/bin/python3
+"""Tests that one gross error among the control points is named and moves nothing. usage: wrong_control.py MEGABLOCK
+
+A simulated block without positions hangs on six control points. Each point in turn gets a coordinate that is 10 m off,
+or a mark that is 100 px off. The poses must stay within one sigma of those that the block has without the error.
+"""
+import csv
+import pathlib
+import shutil
+import tempfile
+import unittest
+
+import h5py
+
+from program import megablock, status
+
+COORDINATES = ("x_m", "y_m", "z_m")
+
+
+def run(project, job):
+    """The status of the block, and its images by name."""
+    megablock("run", project, "-j", job, "-q")
+    megablock("export", job, "--format", "csv", "-o", job.with_suffix(".csv"))
+    with open(job.with_suffix(".csv") / "images_local.csv") as table:
+        return status(job), {row["image"]: row for row in csv.DictReader(table)}
+
+
+class WrongControl(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.work = pathlib.Path(tempfile.mkdtemp(prefix="megablock-wrong-control-"))
+        cls.block = cls.work / "block"
+        megablock("simulate", "--frames", 25, "--gps-sigma", 0, "--control-points", 6, "--control-sigma", 0.02,
+                  "-o", cls.block)
+        cls.right, cls.poses = run(cls.block / "block.yaml", cls.work / "right")
+        with h5py.File(cls.block / "given.h5") as given:
+            cls.names = list(given["control/name"].asstr()[:])
+            cls.counts = given["control/measurements"][:]
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.work)
+
+    def spoil(self, name, change):
+        """Runs a copy of the block after change(given.h5), and returns the remarks."""
+        folder = self.work / name
+        shutil.copytree(self.block, folder)
+        with h5py.File(folder / "given.h5", "r+") as given:
+            change(given)
+        wrong, poses = run(folder / "block.yaml", folder / "job")
+        self.assertEqual(poses.keys(), self.poses.keys())
+        for image, row in poses.items():
+            before = self.poses[image]
+            for axis in COORDINATES:
+                # Without the point the block is less certain, which its own sigmas say.
+                moved = abs(float(row[axis]) - float(before[axis])) / float(row["sigma_" + axis])
+                self.assertLess(moved, 1, f"{name}: {image} moves by {moved:.2f} sigmas along {axis}")
+        return "\n".join(wrong["remarks"])
+
+    def test_right_control_gets_no_remark(self):
+        self.assertEqual(self.right["remarks"], [])
+
+    def test_a_coordinate_is_named_and_moves_nothing(self):
+        for point, name in enumerate(self.names):
+            def change(given, point=point):
+                given["control/position"][point, point % 3] += 10
+            said = self.spoil(f"coordinate-{point}", change)
+            self.assertRegex(said, rf"1 of 6 control points differs.*: {name} by (9\.[5-9]|10\.[0-5])\d* m")
+
+    def test_a_mark_is_named_and_moves_nothing(self):
+        first = 0
+        for point, name in enumerate(self.names):
+            row = first + point % self.counts[point]
+            first += self.counts[point]
+            def change(given, row=row):
+                given["control/measurement/pixel"][row, row % 2] += 100
+            said = self.spoil(f"mark-{point}", change)
+            self.assertRegex(said, rf"1 mark of control and check points is rejected: {name} in \S+ by (9\d|10\d)")
+
+
+unittest.main()
