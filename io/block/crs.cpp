@@ -73,15 +73,54 @@ std::string upper(std::string text) {
   return text;
 }
 
+// The code of a UTM zone from a name in upper case without blanks, slashes and the word ZONE: WGS84UTM11N. Each datum
+// numbers its codes by zone. Empty for other names.
+std::string code_of_utm(const std::string& name) {
+  struct Datum {
+    const char* name;
+    int north, south, first_zone, last_zone;  // the code of a zone is `north` or `south` plus its number; 0: none
+  };
+  static constexpr Datum kDatums[] = {
+      {"WGS84", 32600, 32700, 1, 60}, {"ETRS89", 25800, 0, 28, 38}, {"NAD83", 26900, 0, 1, 23}};
+  for (const Datum& datum : kDatums) {
+    int zone = 0;
+    char hemisphere = 0, more = 0;
+    const std::string format = std::string(datum.name) + "UTM%d%c%c";
+    if (std::sscanf(name.c_str(), format.c_str(), &zone, &hemisphere, &more) != 2) continue;
+    const int base = hemisphere == 'N' ? datum.north : hemisphere == 'S' ? datum.south : 0;
+    if (base > 0 && zone >= datum.first_zone && zone <= datum.last_zone) return "EPSG:" + std::to_string(base + zone);
+  }
+  return "";
+}
+
+std::string without(std::string text, const std::string& part) {
+  for (std::size_t at; (at = text.find(part)) != std::string::npos;) text.erase(at, part.size());
+  return text;
+}
+
+// "EPSG:32611+5773" from a name in upper case without blanks; codes may have two colons, and the vertical part may
+// repeat EPSG or be the name of a world-wide geoid. Empty for other names.
+std::string code_of_epsg(std::string name) {
+  if (name.starts_with("EPSG::")) name.erase(5, 1);
+  if (!name.starts_with("EPSG:")) return "";
+  const std::size_t plus = name.find('+');
+  std::string horizontal = name.substr(5, plus == std::string::npos ? plus : plus - 5), vertical;
+  if (horizontal == "4326" && plus == std::string::npos) return "EPSG:4979";
+  if (plus != std::string::npos) vertical = without(without(name.substr(plus + 1), "EPSG::"), "EPSG:");
+  if (vertical == "EGM96") vertical = "5773";
+  if (vertical == "EGM2008") vertical = "3855";
+  return "EPSG:" + horizontal + (vertical.empty() ? "" : "+" + vertical);
+}
+
 // PROJ's name of a system, also for the other forms that control files use.
 std::string proj_name(const std::string& crs) {
-  const std::string name = upper(crs);
-  if (name == "WGS84" || name == "EPSG:4326") return "EPSG:4979";
-  int zone = 0;
-  char hemisphere = 0;
-  if (std::sscanf(name.c_str(), "WGS84 UTM %d%c", &zone, &hemisphere) == 2 && zone >= 1 && zone <= 60 &&
-      (hemisphere == 'N' || hemisphere == 'S'))
-    return "EPSG:" + std::to_string((hemisphere == 'N' ? 32600 : 32700) + zone);
+  if (crs.find('[') != std::string::npos) return crs;  // WKT
+  const std::string name = without(without(upper(crs), " "), "\t");
+  if (name == "WGS84") return "EPSG:4979";
+  if (const std::string code = code_of_utm(without(without(name, "/"), "ZONE")); !code.empty()) return code;
+  if (const std::string code = code_of_epsg(name); !code.empty()) return code;
+  // The old form of PROJ 4. Further parameters would only repeat the definition.
+  if (name.starts_with("+INIT=EPSG:")) return code_of_epsg(name.substr(6, name.find('+', 1) - 6));
   if (crs.starts_with("+") && crs.find("+type=crs") == std::string::npos) return crs + " +type=crs";
   return crs;
 }

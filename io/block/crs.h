@@ -48,10 +48,12 @@ class Georeference {
 };
 
 // Transforms between WGS84 and any system that PROJ knows. `crs` may be "EPSG:25832", "EPSG:25832+5773" (with a
-// vertical system), a PROJ string, WKT, "WGS84" or "WGS84 UTM 32N"; other names are refused, because PROJ would search
-// for them. Coordinates have the order x (easting or longitude), y (northing or latitude), z. Without a vertical
-// system, z is a height above the ellipsoid. Throws InputError for an unknown system, and for one that needs a grid (a
-// geoid, for example) that is not installed: PROJ would otherwise return unchanged heights without a word.
+// vertical system; also "EPSG:25832+EPSG:5773", "EPSG:4326+EGM96"), a PROJ string, also "+init=epsg:25832", WKT,
+// "WGS84", or a UTM zone of WGS84, ETRS89 or NAD83 ("WGS84 UTM 32N", "WGS 84 / UTM zone 32 N"); other names are
+// refused, because PROJ would search for them. Coordinates have the order x (easting or longitude), y (northing or
+// latitude), z. Without a vertical system, z is a height above the ellipsoid. Throws InputError for an unknown system,
+// and for one that needs a grid (a geoid, for example) that is not installed: PROJ would otherwise return unchanged
+// heights without a word.
 class CrsToWgs84 {
  public:
   explicit CrsToWgs84(const std::string& crs);

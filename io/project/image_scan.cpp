@@ -33,6 +33,7 @@ std::vector<std::string> image_names(const fs::path& folder, std::vector<std::st
       continue;
     }
     for (const fs::directory_entry& item : items) {
+      if (is_leftover(item.path())) continue;
       if (item.is_directory(error) && !item.is_symlink(error))
         open.push_back(item.path());
       else if (is_image_name(item.path().string()) && !item.is_directory(error))
@@ -44,6 +45,11 @@ std::vector<std::string> image_names(const fs::path& folder, std::vector<std::st
 }
 
 }  // namespace
+
+bool is_leftover(const fs::path& path) {
+  const std::string name = path.filename().string();
+  return name.starts_with(".") || name == "@eaDir" || name == "__MACOSX" || name == "$RECYCLE.BIN";
+}
 
 std::vector<ScannedImage> scan_images(const std::string& folder, Project& project) {
   // The names are sorted before anything depends on their order, so indices do not depend on the file system. Threads

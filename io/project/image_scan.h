@@ -2,6 +2,8 @@
 // to io/ (project.cpp).
 #pragma once
 
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,11 +18,18 @@ struct ScannedImage {
   std::string path;  // absolute
   ImageHeader header;
   std::uint64_t hash = 0;  // XXH3 of the file
+  // From a file of positions in the block's own frame, which needs no place on earth; header.position is then empty.
+  std::optional<Eigen::Vector3d> local_position;     // metres
+  std::optional<Eigen::Quaterniond> local_attitude;  // ground frame -> camera
 };
 
+// Whether a file or folder is one that systems leave among images, with the endings of images: copies of the metadata
+// that macOS writes on foreign disks ("._a.jpg"), hidden ones, thumbnails of a network disk, archives, waste bins.
+bool is_leftover(const std::filesystem::path& path);
+
 // Returns all jpg, jpeg, png, tif and tiff files below `folder` (in upper or lower case), sorted by the bytes of their
-// names. Files that cannot be read go to project.unreadable. Copies of an earlier file (same bytes) go to
-// project.copies and, like unreadable sub-folders, to project.warnings.
+// names, without leftovers. Files that cannot be read go to project.unreadable. Copies of an earlier file (same bytes)
+// go to project.copies and, like unreadable sub-folders, to project.warnings.
 std::vector<ScannedImage> scan_images(const std::string& folder, Project& project);
 
 // The images that share a camera: kExif by the name "<make> <model> <width>x<height> <focal>mm" (the make is not

@@ -199,7 +199,8 @@ void read_masks(const std::string& folder, Project& project) {
     check_mask(camera, project.file);
   }
   for (const auto& item : fs::directory_iterator(folder))
-    if (item.path().extension() == ".png" && std::find(used.begin(), used.end(), item.path().string()) == used.end())
+    if (item.path().extension() == ".png" && !item.path().filename().string().starts_with("._") &&
+        std::find(used.begin(), used.end(), item.path().string()) == used.end())
       project.warnings.push_back("mask '" + item.path().string() +
                                  "' is not used, because its name is not that of a camera; the cameras are " +
                                  names_of(project.block));

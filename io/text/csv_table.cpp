@@ -2,34 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "io/base/error.h"
-#include "io/base/file_error.h"
 #include "io/text/csv_row.h"
 #include "io/text/plausible.h"
 #include "io/text/settings_reader.h"
+#include "io/text/text_lines.h"
 
 namespace megablock {
 
-namespace {
-
-std::string trimmed(const std::string& text) {
-  const auto first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
-  return first == std::string::npos ? "" : text.substr(first, last - first + 1);
-}
-
-}  // namespace
-
-void refuse_semicolons(const std::string& header, const std::string& where) {
-  // Spreadsheets write semicolons where the comma is the decimal sign.
-  if (header.find(',') == std::string::npos && header.find(';') != std::string::npos)
-    throw InputError(where + ": semicolons between the columns; write commas there, and points in decimal numbers");
-}
-
 CsvTable::CsvTable(const std::string& path) : path_(path) {
-  std::ifstream stream = open_input(path);
+  std::istringstream stream(read_text(path));
   std::int64_t lines = 0, number = 1;  // of the row's first line
-  for (std::string line; read_csv_row(stream, path, line, lines); number = lines + 1) {
+  for (std::string line; read_csv_row(stream, path, line, lines, separator_); number = lines + 1) {
     if (trimmed(line).empty()) continue;
     if (line.front() == '#') {
       const auto colon = line.find(':');
@@ -37,10 +23,12 @@ CsvTable::CsvTable(const std::string& path) : path_(path) {
       continue;
     }
     const std::string place = path + ":" + std::to_string(number);
-    std::vector<std::string> fields = csv_fields(line);
+    // Spreadsheets may name their separator in a line of its own.
+    if (columns_.empty() && lower_case(line).starts_with("sep=")) continue;
+    if (columns_.empty()) separator_ = csv_separator(line);
+    std::vector<std::string> fields = csv_fields(line, separator_);
     if (columns_.empty()) {
       header_line_ = number;
-      refuse_semicolons(line, place);
       for (std::size_t c = 0; c < fields.size(); ++c)
         if (!columns_.emplace(fields[c], c).second)
           throw InputError(place + ": column '" + fields[c] + "' appears twice");
@@ -75,8 +63,13 @@ std::string CsvTable::text(std::size_t row, const std::string& column) const {
   return found == columns_.end() ? "" : rows_[row][found->second];
 }
 
-std::optional<double> CsvTable::number(std::size_t row, const std::string& column) const {
+std::string CsvTable::number_text(std::size_t row, const std::string& column) const {
   const std::string value = text(row, column);
+  return separator_ == ',' ? value : with_decimal_point(value, Separator::kSemicolon);
+}
+
+std::optional<double> CsvTable::number(std::size_t row, const std::string& column) const {
+  const std::string value = number_text(row, column);
   if (value.empty() || value == "NaN" || value == "nan") return std::nullopt;
   return parse_number(value, column, where(row));
 }
@@ -88,7 +81,7 @@ std::optional<double> CsvTable::number(std::size_t row, const std::string& colum
 }
 
 double CsvTable::needed_number(std::size_t row, const std::string& column) const {
-  const std::string value = text(row, column);
+  const std::string value = number_text(row, column);
   if (value.empty()) throw InputError(where(row) + ": " + column + " is empty");
   return parse_number(value, column, where(row));
 }

@@ -1,4 +1,6 @@
-// Reads a small CSV file: comments ("# key: value"), a header line, rows as in csv_row.h. Internal to io/.
+// Reads a small CSV file: comments ("# key: value"), a header line, rows as in csv_row.h. The header
+// tells the separator: commas, semicolons or tabs. With the last two, numbers may have a decimal comma, as spreadsheets
+// write them in many countries. Internal to io/.
 #pragma once
 
 #include <map>
@@ -9,9 +11,6 @@
 #include "io/text/plausible.h"
 
 namespace megablock {
-
-// Throws InputError "where: ..." for a header with semicolons between its columns.
-void refuse_semicolons(const std::string& header, const std::string& where);
 
 // The table of a file. Columns are addressed by their names in the header.
 class CsvTable {
@@ -36,7 +35,10 @@ class CsvTable {
   std::string comment(const std::string& key) const;
 
  private:
+  std::string number_text(std::size_t row, const std::string& column) const;  // with a decimal point
+
   std::string path_;
+  char separator_ = ',';
   std::map<std::string, std::size_t> columns_;
   std::map<std::string, std::string> comments_;
   std::vector<std::vector<std::string>> rows_;

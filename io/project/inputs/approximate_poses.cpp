@@ -10,6 +10,7 @@
 #include "geometry/transform/body_attitude.h"
 #include "io/base/error.h"
 #include "io/block/ground_change.h"
+#include "io/project/inputs/image_lookup.h"
 #include "io/project/inputs/pose_csv.h"
 #include "io/text/csv_table.h"
 
@@ -156,32 +157,31 @@ ApproximatePoses read_approximate_poses(const std::string& path) {
 void set_given_poses(const ApproximatePoses& poses, const std::vector<std::string>& left_out, Block& block,
                      std::vector<std::string>& warnings) {
   const ToBlock to_block(poses, block.ground);
+  const ImageLookup images(block, left_out);
   std::map<std::string, FrameIndex> frames;
-  std::map<std::string, ImageIndex> images;
   for (std::size_t f = 0; f < block.frames.size(); ++f)
     frames.emplace(block.frames[FrameIndex(static_cast<std::int64_t>(f))].name,
                    FrameIndex(static_cast<std::int64_t>(f)));
-  for (std::size_t i = 0; i < block.images.size(); ++i)
-    images.emplace(block.name_of(ImageIndex(static_cast<std::int64_t>(i))), ImageIndex(static_cast<std::int64_t>(i)));
   std::set<FrameIndex> placed;  // frames with a pose from an earlier row; a pose that the block had is replaced
   for (const ApproximatePoses::Row& row : poses.rows) {
     // A single image and its frame have the same name. Its mount is the identity, so both readings of the row agree.
-    const auto image = images.find(row.name);
     const auto frame = frames.find(row.name);
-    if (std::find(left_out.begin(), left_out.end(), row.name) != left_out.end()) {
+    const bool of_frame = frame != frames.end() && !images.has(row.name);
+    const ImageLookup::Found image = of_frame ? ImageLookup::Found() : images.find(row.name);
+    if (image.kind == ImageLookup::Kind::kLeftOut) {
       warnings.push_back(row.where + ": the pose of '" + row.name + "' is not used, because '" + row.name +
                          "' was left out of the block");
-    } else if (image != images.end()) {
+    } else if (image.kind == ImageLookup::Kind::kImage) {
       // The pose of the frame follows from that of the camera: X_cam = R_m (R_f (X - C_f) - C_m).
       const Pose camera = to_block(row);
-      const Pose& mount = block.mount_of(image->second).pose;
+      const Pose& mount = block.mount_of(image.image).pose;
       const Eigen::Quaterniond rotation = (mount.rotation.conjugate() * camera.rotation).normalized();
-      const FrameIndex index = block.images[image->second].frame;
+      const FrameIndex index = block.images[image.image].frame;
       Frame& target = block.frames[index];
       if (row.pass) target.pass = *row.pass;
       if (placed.insert(index).second)
         target.given_pose = Pose{rotation, camera.centre - rotation.conjugate() * mount.centre};
-    } else if (frame != frames.end()) {
+    } else if (of_frame) {
       Frame& target = block.frames[frame->second];
       if (row.pass) target.pass = *row.pass;
       target.given_pose = to_block(row);

@@ -9,6 +9,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <utility>
 
 #include "io/base/error.h"
 #include "io/base/file_error.h"
@@ -16,6 +17,7 @@
 #include "io/text/csv_table.h"
 #include "io/text/plausible.h"
 #include "io/text/settings_reader.h"
+#include "io/text/text_lines.h"
 #include "io/text/text_writer.h"
 
 namespace megablock {
@@ -35,51 +37,79 @@ void check_coordinates(const Eigen::Vector3d& coordinates, const std::string& wh
 
 // -- gcp_list.txt --
 
-// Splits a line at tabs if it has any (image names may then contain blanks), otherwise at blanks.
-std::vector<std::string> fields_of(const std::string& line) {
-  std::vector<std::string> fields;
-  const char* separators = line.find('\t') != std::string::npos ? "\t\r" : " \r";
-  for (std::size_t at = line.find_first_not_of(separators); at != std::string::npos;) {
-    const std::size_t end = line.find_first_of(separators, at);
-    fields.push_back(line.substr(at, end - at));
-    at = end == std::string::npos ? end : line.find_first_not_of(separators, end);
+bool is_unknown_height(const std::string& text) { return lower_case(text) == "nan"; }
+
+struct GcpFields {
+  std::vector<std::string> text;
+  Separator separator = Separator::kBlanks;
+  std::string number(std::size_t field) const { return with_decimal_point(text[field], separator); }
+};
+
+constexpr std::size_t kGcpNumbers = 5;  // x y z column row
+
+// Whether the first five fields are numbers, or the height is unknown.
+bool is_gcp_row(const GcpFields& fields) {
+  if (fields.text.size() <= kGcpNumbers) return false;
+  for (std::size_t f = 0; f < kGcpNumbers; ++f)
+    if (!is_number(fields.number(f)) && (f != 2 || !is_unknown_height(fields.text[f]))) return false;
+  return true;
+}
+
+// Splits a line at the separator that leaves five numbers in front, so that "13,4 52,5 40 5 6 a.jpg" has decimal commas
+// and "13.4,52.5,40,5,6,a.jpg" has commas between its fields. Tabs come first: names may then contain blanks.
+GcpFields gcp_fields(const std::string& line) {
+  for (const Separator separator : {Separator::kTab, Separator::kSemicolon, Separator::kComma, Separator::kBlanks}) {
+    GcpFields fields{split_fields(line, separator), separator};
+    if (is_gcp_row(fields)) return fields;
   }
-  return fields;
+  return {split_fields(line, separator_of(line)), separator_of(line)};
 }
 
-double number_or_nan(const std::string& text, const std::string& what, const std::string& where) {
-  if (text == "NaN" || text == "nan" || text == "NAN") return kNaN;
-  return parse_number(text, what, where);
+// The line under the system may name the columns.
+bool names_gcp_columns(const GcpFields& fields) {
+  return fields.text.size() > kGcpNumbers &&
+         std::none_of(fields.text.begin(), fields.text.end(), [](const std::string& text) { return is_number(text); });
 }
 
-ControlTable read_gcp_list(std::istream& stream, const std::string& path) {
+// The name of the system without quotes, and without the separators that spreadsheets write after it.
+std::string gcp_system(std::string line) {
+  while (!line.empty() && std::string(" \t,;").find(line.back()) != std::string::npos) line.pop_back();
+  if (line.size() > 1 && line.front() == '"' && line.back() == '"') line = line.substr(1, line.size() - 2);
+  return line;
+}
+
+ControlTable read_gcp_list(const std::string& path) {
   ControlTable table;
   table.pixels = ControlTable::Pixels::kCentresAtInteger;
   table.crs.clear();
   std::map<std::string, std::size_t> point_of_key;
-  std::int64_t number = 0;
-  for (std::string line; std::getline(stream, line);) {
-    const std::string where = path + ":" + std::to_string(++number);
-    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
-    if (line.empty() || line.front() == '#') continue;
+  bool first_row = true;
+  for (const TextLine& line : read_text_lines(path)) {
+    const std::string where = path + ":" + std::to_string(line.number);
+    if (line.text.front() == '#') continue;
     if (table.crs.empty()) {
-      table.crs = line;
+      table.crs = gcp_system(line.text);
       table.crs_where = where;
       continue;
     }
-    const std::vector<std::string> fields = fields_of(line);
-    if (fields.size() < 6)
-      throw InputError(where + ": " + std::to_string(fields.size()) +
+    const GcpFields fields = gcp_fields(line.text);
+    if (std::exchange(first_row, false) && names_gcp_columns(fields)) continue;
+    if (fields.text.size() <= kGcpNumbers)
+      throw InputError(where + ": " + std::to_string(fields.text.size()) +
                        " fields in this line; expected x y z column row image [name]");
     // Without a name, the text of the coordinates identifies the point: programs repeat it in each line.
-    const std::string key = fields.size() > 6 ? fields[6] : fields[0] + " " + fields[1] + " " + fields[2];
-    const Eigen::Vector3d coordinates(parse_number(fields[0], "x", where), parse_number(fields[1], "y", where),
-                                      number_or_nan(fields[2], "z", where));
+    const bool has_name = fields.text.size() > 6 && !fields.text[6].empty();
+    const std::string key = has_name ? fields.text[6] : fields.text[0] + " " + fields.text[1] + " " + fields.text[2];
+    const auto number = [&](std::size_t field, const char* what) {
+      return parse_number(fields.number(field), what, where);
+    };
+    const Eigen::Vector3d coordinates(number(0, "x"), number(1, "y"),
+                                      is_unknown_height(fields.text[2]) ? kNaN : number(2, "z"));
     check_coordinates(coordinates, where);
     const auto [found, inserted] = point_of_key.emplace(key, table.points.size());
     if (inserted) {
       ControlTable::Point point;
-      point.name = fields.size() > 6 ? fields[6] : "gcp" + std::to_string(table.points.size() + 1);
+      point.name = has_name ? key : "gcp" + std::to_string(table.points.size() + 1);
       point.coordinates = coordinates;
       point.where = where;
       table.points.push_back(point);
@@ -90,8 +120,7 @@ ControlTable read_gcp_list(std::istream& stream, const std::string& path) {
     if (coordinates.head<2>() != point.coordinates.head<2>() || !same_height)
       throw InputError(where + ": point '" + point.name + "' has other coordinates than in " + point.where +
                        "; correct one of the lines, or give the points different names");
-    point.measurements.push_back(
-        {fields[5], {parse_number(fields[3], "column", where), parse_number(fields[4], "row", where)}, 0.5, where});
+    point.measurements.push_back({fields.text[5], {number(3, "column"), number(4, "row")}, 0.5, where});
   }
   if (table.crs.empty())
     throw InputError(path +
@@ -245,13 +274,23 @@ ControlTable read_csv(const std::string& path) {
   return table;
 }
 
+// Whether a file has the first line of gcp_list.txt: the name of a system alone, not the names of columns.
+bool begins_with_system(const std::string& path) {
+  for (const TextLine& line : read_text_lines(path)) {
+    if (line.text.front() == '#') continue;
+    const std::string head = gcp_system(line.text);
+    return split_fields(head, separator_of(head)).size() == 1;
+  }
+  return false;
+}
+
 }  // namespace
 
 ControlTable read_control_table(const std::string& path) {
-  const std::string extension = std::filesystem::path(path).extension().string();
-  if (extension == ".csv") return read_csv(path);
-  std::ifstream stream = open_input(path);
-  if (extension != ".json") return read_gcp_list(stream, path);
+  const std::string extension = lower_case(std::filesystem::path(path).extension().string());
+  if (extension == ".csv" && !begins_with_system(path)) return read_csv(path);
+  if (extension != ".json") return read_gcp_list(path);
+  const std::ifstream stream = open_input(path);
   std::ostringstream text;
   text << stream.rdbuf();
   return read_json(text.str(), path);

@@ -7,10 +7,15 @@
 //   Later lines of a point may leave coordinates, role and sigmas empty. Pixel centres are at +0.5.
 // * .json: ground_control_points.json of OpenSfM. Positions are latitude, longitude and altitude (WGS84, ellipsoidal
 //   height, metres). Image coordinates refer to the image centre and are divided by max(width, height).
-// * any other name: gcp_list.txt of ODM and OpenSfM. The first line names the coordinate reference system ("WGS84",
-//   "WGS84 UTM 32N", "EPSG:25832", a PROJ string). The other lines are "x y z column row image [name ...]", separated
-//   by tabs or blanks (x = easting or longitude; z may be NaN). Lines with the same name, or without names but with the
-//   same coordinates, belong to one point. Columns and rows count from 0 at the centre of the first pixel; we add 0.5.
+// * any other name, and .csv whose first line has one field: gcp_list.txt of ODM and OpenSfM
+//   (docs.opendronemap.org/gcp). The first line names the coordinate reference system (io/block/crs.h). The other lines
+//   are "x y z column row image [name ...]" (x = easting or longitude; z may be NaN), separated by blanks, tabs, commas
+//   or semicolons; numbers may have decimal commas where commas do not separate. The line below the first may name the
+//   columns. Lines with the same name, or without names but with the same coordinates, belong to one point. Columns and
+//   rows count from 0 at the centre of the first pixel; we add 0.5.
+//
+// Heights are above the ellipsoid unless the system has a vertical part. io/text/text_lines.h says which files are
+// text, io/project/inputs/image_lookup.h which names of images are understood.
 //
 // In our pixels the centre of the first one is (0.5, 0.5), so the image spans [0, w] x [0, h]. The two other
 // conventions become
@@ -55,10 +60,10 @@ ControlTable read_control_table(const std::string& path);
 // The WGS84 positions of the points (unknown heights are NaN), to choose an origin. Empty for local coordinates.
 std::vector<Geodetic> geodetic_positions(const ControlTable& table);
 
-// Adds the points to the block, in its ground frame. Throws InputError with file:line for a measurement in an image
-// that the block does not have, for one outside its image, for two of one point in one image, and for coordinates that
-// do not fit the block's frame. Measurements in images of `left_out` (unreadable files or copies) are dropped with a
-// warning.
+// Adds the points to the block, in its ground frame. Measurements in images of `left_out` (unreadable files or copies)
+// and in images that the block does not have are dropped with a warning. Throws InputError with file:line if no
+// measurement is in an image of the block, for one outside its image, for two of one point in one image, and for
+// coordinates that do not fit the block's frame.
 void add_control(const ControlTable& table, const std::vector<std::string>& left_out, Block& block,
                  std::vector<std::string>& warnings);
 

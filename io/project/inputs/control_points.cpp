@@ -1,33 +1,47 @@
-// Adds the control points of a table to the block: finds their images by name, and converts image coordinates to pixels
+// Adds the control points of a table to the block: finds their images, and converts image coordinates to pixels
 // and positions to the ground frame.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <map>
 #include <set>
 
 #include "io/base/error.h"
 #include "io/block/held_priors.h"
 #include "io/project/inputs/control_file.h"
+#include "io/project/inputs/image_lookup.h"
 
 namespace megablock {
 
 namespace {
 
-// The images by their name, and also by its last part where that is unique: control files often leave folders out.
-std::map<std::string, ImageIndex> images_by_name(const Block& block) {
-  std::map<std::string, ImageIndex> by_name, by_last;
-  for (std::size_t i = 0; i < block.images.size(); ++i) {
-    const ImageIndex image(static_cast<std::int64_t>(i));
-    const std::string& name = block.name_of(image);
-    by_name.emplace(name, image);
-    const auto [found, inserted] = by_last.emplace(name.substr(name.find_last_of('/') + 1), image);
-    if (!inserted) found->second = ImageIndex();
+// Collects the measurements in images that the block does not have, for one warning about all of them.
+class AbsentImages {
+ public:
+  void add(const ControlTable::Measurement& m) {
+    if (measurements_++ == 0) first_ = &m;
+    if (std::find(names_.begin(), names_.end(), m.image) == names_.end()) names_.push_back(m.image);
   }
-  for (const auto& [name, image] : by_last)
-    if (image.valid()) by_name.emplace(name, image);
-  return by_name;
-}
+
+  // Throws InputError if no measurement of the table is in an image of the block: the list belongs to other images.
+  void report(std::int64_t used, std::vector<std::string>& warnings) const {
+    if (names_.empty()) return;
+    constexpr std::size_t kNamed = 5;
+    std::string list;
+    for (std::size_t i = 0; i < std::min(kNamed, names_.size()); ++i) list += (i ? ", '" : "'") + names_[i] + "'";
+    if (names_.size() > kNamed) list += " and " + std::to_string(names_.size() - kNamed) + " more";
+    if (used == 0)
+      throw InputError(first_->where + ": the block has none of the images in which the points are measured (" + list +
+                       "); give the list that belongs to these images, or correct the names");
+    warnings.push_back(first_->where + ": " + std::to_string(measurements_) +
+                       (measurements_ == 1 ? " measurement is" : " measurements are") +
+                       " not used, because the block has no image " + list + "; correct the name or delete the line");
+  }
+
+ private:
+  const ControlTable::Measurement* first_ = nullptr;
+  std::int64_t measurements_ = 0;
+  std::vector<std::string> names_;
+};
 
 Eigen::Vector2d pixel_of(const ControlTable::Measurement& m, ControlTable::Pixels pixels, const Camera& camera) {
   const Eigen::Vector2d size(camera.width, camera.height);
@@ -105,8 +119,9 @@ std::vector<Geodetic> geodetic_positions(const ControlTable& table) {
 void add_control(const ControlTable& table, const std::vector<std::string>& left_out, Block& block,
                  std::vector<std::string>& warnings) {
   const ToGround to_ground(table, block.ground);
-  const std::map<std::string, ImageIndex> images = images_by_name(block);
-  const std::set<std::string> known_bad(left_out.begin(), left_out.end());
+  const ImageLookup images(block, left_out);
+  AbsentImages absent;
+  std::int64_t used = 0;
   for (const ControlTable::Point& entry : table.points) {
     ControlPoint point;
     point.name = entry.name;
@@ -116,25 +131,32 @@ void add_control(const ControlTable& table, const std::vector<std::string>& left
     if (std::isnan(entry.coordinates.z())) point.sigma.z() = kUnknownHeightSigma;
     std::set<ImageIndex> seen;
     for (const ControlTable::Measurement& m : entry.measurements) {
-      if (known_bad.contains(m.image)) {
+      const ImageLookup::Found found = images.find(m.image);
+      if (found.kind == ImageLookup::Kind::kLeftOut) {
+        ++used;  // the list belongs to these images
         warnings.push_back(m.where + ": the measurement of point '" + entry.name + "' is not used, because image '" +
                            m.image + "' was left out of the block");
         continue;
       }
-      const auto found = images.find(m.image);
-      if (found == images.end())
+      if (found.kind == ImageLookup::Kind::kAbsent) {
+        absent.add(m);
+        continue;
+      }
+      if (found.kind == ImageLookup::Kind::kAmbiguous)
         throw InputError(m.where + ": point '" + entry.name + "' is measured in image '" + m.image +
-                         "', which the block does not have; correct the name or delete the measurement");
-      if (!seen.insert(found->second).second)
+                         "', and several images of the block have this name; write it with its folder");
+      if (!seen.insert(found.image).second)
         throw InputError(m.where + ": point '" + entry.name + "' is measured twice in image '" + m.image +
                          "'; delete one of the measurements");
-      const Camera& camera = block.cameras[block.camera_of(found->second)];
+      ++used;
+      const Camera& camera = block.cameras[block.camera_of(found.image)];
       const Eigen::Vector2d pixel = pixel_of(m, table.pixels, camera);
       check_pixel(m, pixel, camera);
-      point.measurements.push_back({found->second, pixel, m.sigma_px});
+      point.measurements.push_back({found.image, pixel, m.sigma_px});
     }
     block.control_points.push_back(std::move(point));
   }
+  absent.report(used, warnings);
   warnings.insert(warnings.end(), table.warnings.begin(), table.warnings.end());
 }
 

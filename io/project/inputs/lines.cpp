@@ -1,10 +1,10 @@
 #include "io/project/inputs/lines.h"
 
-#include <algorithm>
 #include <map>
 #include <set>
 
 #include "io/base/error.h"
+#include "io/project/inputs/image_lookup.h"
 #include "io/text/csv_table.h"
 #include "io/text/plausible.h"
 
@@ -51,11 +51,7 @@ void read_lines(const std::string& path, const std::vector<std::string>& left_ou
   std::vector<std::string> known = columns;
   known.push_back("sigma_px");
   csv.refuse_others(known);
-  std::map<std::string, ImageIndex> images;
-  for (std::size_t i = 0; i < block.images.size(); ++i) {
-    const ImageIndex image(static_cast<std::int64_t>(i));
-    images.emplace(block.name_of(image), image);
-  }
+  const ImageLookup images(block, left_out);
   std::map<std::string, std::size_t> line_of_name;
   std::map<std::string, std::string> first_place;
   std::set<std::pair<std::string, ImageIndex>> seen;
@@ -70,19 +66,22 @@ void read_lines(const std::string& path, const std::vector<std::string>& left_ou
       throw InputError(where + ": line '" + name + "' has another direction than in " + first_place[name] +
                        "; correct one of the two, or give the lines different names");
     first_place.emplace(name, where);
-    if (std::find(left_out.begin(), left_out.end(), image) != left_out.end()) {
+    const ImageLookup::Found found = images.find(image);
+    if (found.kind == ImageLookup::Kind::kLeftOut) {
       warnings.push_back(where + ": the measurement of line '" + name + "' is not used, because image '" + image +
                          "' was left out of the block");
       continue;
     }
-    const auto found = images.find(image);
-    if (found == images.end())
+    if (found.kind == ImageLookup::Kind::kAmbiguous)
+      throw InputError(where + ": line '" + name + "' is measured in image '" + image +
+                       "', and several images of the block have this name; write it with its folder");
+    if (found.kind == ImageLookup::Kind::kAbsent)
       throw InputError(where + ": line '" + name + "' is measured in image '" + image +
                        "', which the block does not have; correct the name or delete the measurement");
-    if (!seen.emplace(name, found->second).second)
+    if (!seen.emplace(name, found.image).second)
       throw InputError(where + ": line '" + name + "' is measured twice in image '" + image +
                        "'; delete one of the measurements");
-    line.measurements.push_back(measurement(csv, row, found->second, block.cameras[block.camera_of(found->second)]));
+    line.measurements.push_back(measurement(csv, row, found.image, block.cameras[block.camera_of(found.image)]));
   }
   for (const KnownLine& line : block.lines)
     if (line.direction == KnownLine::Direction::kHorizontal && line.measurements.size() < 2)

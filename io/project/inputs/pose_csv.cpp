@@ -12,8 +12,8 @@
 #include "io/base/error.h"
 #include "io/base/file_error.h"
 #include "io/text/csv_row.h"
-#include "io/text/csv_table.h"
 #include "io/text/plausible.h"
+#include "io/text/text_lines.h"
 
 namespace megablock {
 
@@ -28,15 +28,15 @@ class CsvReader {
 
   PoseTable read() {
     std::int64_t lines = 0;
-    for (std::string line; read_csv_row(stream_, path_, line, lines); line_ = lines + 1) {
+    for (std::string line; read_csv_row(stream_, path_, line, lines, separator_); line_ = lines + 1) {
       if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
       if (line.front() == '#') {
         read_origin(line);
       } else if (columns_.empty()) {
-        refuse_semicolons(line, where());
-        read_header(csv_fields(line));
+        separator_ = csv_separator(line);
+        read_header(csv_fields(line, separator_));
       } else {
-        read_row(csv_fields(line));
+        read_row(csv_fields(line, separator_));
       }
     }
     if (table_.names.empty())
@@ -85,8 +85,9 @@ class CsvReader {
     std::array<double, 8> value{};
     for (std::size_t c = 0; c < kColumns.size(); ++c) {
       if (columns_[c] >= fields.size()) fail(std::string("column '") + kColumns[c] + "' is missing in this line");
-      const std::string& field = fields[columns_[c]];
       if (c == 0) continue;
+      const std::string& text = fields[columns_[c]];
+      const std::string field = separator_ == ',' ? text : with_decimal_point(text, Separator::kSemicolon);
       // Exact, and the same in every locale.
       const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value[c]);
       if (error != std::errc() || end != field.data() + field.size() || !std::isfinite(value[c]))
@@ -107,7 +108,8 @@ class CsvReader {
 
   std::string path_;
   std::ifstream stream_;
-  std::int64_t line_ = 1;             // the first one of the row
+  std::int64_t line_ = 1;  // the first one of the row
+  char separator_ = ',';
   std::vector<std::size_t> columns_;  // position of each of kColumns in a line
   std::optional<std::size_t> pass_;   // position of the column 'pass'
   std::unordered_set<std::string> seen_;

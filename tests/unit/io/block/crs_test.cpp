@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <optional>
 #include <thread>
 
 #include "geometry/numbers/angles.h"
@@ -100,6 +101,36 @@ TEST(CrsToWgs84, TakesLongitudeFirstAndKeepsWgs84) {
     EXPECT_NEAR(p.latitude_deg, 52.5, 1e-12) << name;
     EXPECT_NEAR(p.longitude_deg, 13.4, 1e-12) << name;
     EXPECT_NEAR(p.height_m, 30, 1e-9) << name;
+  }
+}
+
+TEST(CrsToWgs84, KnowsTheNamesOfOtherPrograms) {
+  const Eigen::Vector3d place(500000, 5000000, 10);
+  const auto same = [&](const char* name, const char* code) {
+    EXPECT_LT((CrsToWgs84(name).from_wgs84(CrsToWgs84(code).to_wgs84(place)) - place).norm(), 1e-4) << name;
+  };
+  for (const char* name : {"WGS84 UTM 11 N", "wgs84 utm 11n", "WGS 84 / UTM zone 11N", "+init=epsg:32611",
+                           "EPSG::32611", "+init=epsg:32611 +units=m", "epsg:32611", "EPSG: 32611"})
+    same(name, "EPSG:32611");
+  same("WGS84 UTM 33S", "EPSG:32733");
+  same("ETRS89 / UTM zone 32N", "EPSG:25832");
+  same("NAD83 UTM 11N", "EPSG:26911");
+  for (const char* name : {"WGS84 UTM 61N", "ETRS89 UTM 33S", "WGS84 UTM 11", "WGS84 UTM 11NX", "EPSG:32611+nothing"})
+    EXPECT_THROW(CrsToWgs84{name}, InputError) << name;
+}
+
+// Undulations that the NGA publishes as the test of its program for EGM96 (outintpt.dat of f477).
+TEST(CrsToWgs84, HeightsAboveTheGeoidAreThoseOfEgm96) {
+  for (const char* name : {"EPSG:4326+5773", "EPSG:4326+EPSG:5773", "EPSG:4326 + EGM96"}) {
+    std::optional<CrsToWgs84> crs;
+    try {
+      crs.emplace(name);
+    } catch (const InputError&) {
+      GTEST_SKIP() << "the grid of EGM96 is not installed";
+    }
+    EXPECT_NEAR(crs->to_wgs84({269.7791550 - 360, 38.6281550, 100}).height_m, 100 - 31.629, 0.1) << name;
+    EXPECT_NEAR(crs->to_wgs84({102.4487290, 46.8743190, 0}).height_m, -43.572, 0.1) << name;
+    EXPECT_NEAR(crs->to_wgs84({0.0023, -0.466744, 0}).height_m, 17.330, 0.1) << name;
   }
 }
 

@@ -110,14 +110,15 @@ TEST(Project, GpsOptionsAndOriginOverride) {
 
 TEST(Project, AccuracyInTheHeaderGivesTheSigmas) {
   ScratchDirectory folder;
-  const Tags gps = gps_tags(46.84, -91.99, 250);
-  write_image_file(folder.path("images/0_dop.jpg"), 64, 48, 0, joined(gps, {{"Exif.GPSInfo.GPSDOP", "10/1"}}));
-  write_image_file(folder.path("images/1_good_dop.jpg"), 64, 48, 1, joined(gps, {{"Exif.GPSInfo.GPSDOP", "9/10"}}));
+  // The images lie apart: equal positions would count as one.
+  const auto gps = [](int i) { return gps_tags(46.84, -91.99 + 0.001 * i, 250); };
+  write_image_file(folder.path("images/0_dop.jpg"), 64, 48, 0, joined(gps(0), {{"Exif.GPSInfo.GPSDOP", "10/1"}}));
+  write_image_file(folder.path("images/1_good_dop.jpg"), 64, 48, 1, joined(gps(1), {{"Exif.GPSInfo.GPSDOP", "9/10"}}));
   write_image_file(folder.path("images/2_rtk.jpg"), 64, 48, 2,
-                   joined(gps, {{"Xmp.drone-dji.RtkStdLon", "0.01"},
-                                {"Xmp.drone-dji.RtkStdLat", "0.02"},
-                                {"Xmp.drone-dji.RtkStdHgt", "0.03"}}));
-  Tags flat = gps;
+                   joined(gps(2), {{"Xmp.drone-dji.RtkStdLon", "0.01"},
+                                   {"Xmp.drone-dji.RtkStdLat", "0.02"},
+                                   {"Xmp.drone-dji.RtkStdHgt", "0.03"}}));
+  Tags flat = gps(3);
   flat.erase("Exif.GPSInfo.GPSAltitude");
   write_image_file(folder.path("images/3_flat.jpg"), 64, 48, 3, flat);
   const Block block = read_text(folder, "images: images\n").block;
@@ -186,6 +187,20 @@ TEST(Project, GimbalAnglesBecomeAttitudesInTheBlock) {
               1 * kDegree, 1e-9);
   for (const Frame& f : read_text(folder, "images: images\nattitude: {sigma_deg: 0}\n").block.frames)
     EXPECT_TRUE(held(*f.attitude_prior));
+}
+
+// What systems and other programs leave in folders of images (shared/data/hard, leftovers).
+TEST(Project, LeftoversOfOtherProgramsAreNoImages) {
+  ScratchDirectory folder;
+  write_line(folder, 2);
+  for (const char* name : {"._0.jpg", "._1.jpg", "Thumbs.db", ".DS_Store", "0.jpg_original", "desktop.ini"})
+    write_file(folder.path(std::string("images/") + name), std::string("\0\5\x16\7\0\2\0\0Mac OS X        ", 24));
+  for (const char* name : {"@eaDir/0.jpg/SYNOPHOTO_THUMB_XL.jpg", "__MACOSX/images/._0.jpg", ".thumbnails/0.jpg"})
+    write_image_file(folder.path(std::string("images/") + name), 16, 12, 7);
+  const Project project = read_text(folder, "images: images\n");
+  EXPECT_THAT(image_names(project.block), ElementsAre("0.jpg", "1.jpg"));
+  EXPECT_THAT(project.unreadable, IsEmpty());
+  EXPECT_THAT(project.warnings, IsEmpty());
 }
 
 TEST(Project, BadFilesAndCopiesAreLeftOut) {

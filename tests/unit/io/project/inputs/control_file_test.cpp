@@ -2,7 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cctype>
 #include <filesystem>
+#include <functional>
 
 #include "io/base/error.h"
 #include "io/project/project.h"
@@ -83,10 +86,9 @@ TEST_F(ControlFile, GcpListInEveryNameOfUtmMeansTheSamePlace) {
 TEST_F(ControlFile, GcpListRefusals) {
   const std::string good = "13.4 52.52 40 5 6 sub/0.jpg a\n";
   EXPECT_EQ(refusal("gcp_list.txt", "WGS84\n" + good), "");
-  EXPECT_EQ(
-      refusal("gcp_list.txt", "WGS84\n" + good + "13.4 52.52 40 5 6 DSC7.jpg a\n"),
-      "gcp_list.txt:3: point 'a' is measured in image 'DSC7.jpg', which the block does not have; correct the name or "
-      "delete the measurement");
+  EXPECT_EQ(refusal("gcp_list.txt", "WGS84\n13.4 52.52 40 5 6 DSC7.jpg a\n13.4 52.52 40 5 6 DSC8.jpg a\n"),
+            "gcp_list.txt:2: the block has none of the images in which the points are measured ('DSC7.jpg', "
+            "'DSC8.jpg'); give the list that belongs to these images, or correct the names");
   EXPECT_THAT(refusal("gcp_list.txt", "WGS84\n13.4 52.52 40 5\n"),
               HasSubstr("gcp_list.txt:2: 4 fields in this line; expected"));
   EXPECT_THAT(refusal("gcp_list.txt", "WGS84\nx 52.52 40 5 6 sub/0.jpg\n"), HasSubstr("gcp_list.txt:2: x: 'x' is not"));
@@ -134,7 +136,7 @@ TEST_F(ControlFile, OpenSfmJsonRefusals) {
               HasSubstr("g.json:2: 'longitude' is missing"));
   const std::string point = "{\"points\": [{\"id\": \"a\", \"position\": {\"latitude\": 52.52, \"longitude\": 13.4},\n";
   EXPECT_THAT(refusal(name, point + "\"observations\": [{\"shot_id\": \"x.jpg\", \"projection\": [0, 0]}]}]}"),
-              HasSubstr("g.json:2: point 'a' is measured in image 'x.jpg'"));
+              HasSubstr("g.json:2: the block has none of the images in which the points are measured ('x.jpg')"));
   EXPECT_THAT(refusal(name, point + "\"observations\": [{\"shot_id\": \"sub/0.jpg\", \"projection\": [0]}]}]}"),
               HasSubstr("needs shot_id and projection"));
 }
@@ -173,14 +175,12 @@ TEST_F(ControlFile, CsvInTheBlocksFrameAndItsWriterReturn) {
 TEST_F(ControlFile, CsvRefusals) {
   const std::string header = "name,x,y,z,image,column_px,row_px\n";
   EXPECT_THAT(refusal("c.csv", "# crs: EPSG:123456\n" + header), HasSubstr("c.csv: coordinate reference system 'EPSG"));
-  EXPECT_EQ(refusal("c.csv", "\xef\xbb\xbfname;x;y;z;image;column_px;row_px\na;1,5;2;3;sub/0.jpg;3;4\n"),
-            "c.csv:1: semicolons between the columns; write commas there, and points in decimal numbers");
   EXPECT_THAT(refusal("c.csv", "name,x,y\n"), HasSubstr("c.csv:1: column 'z' is missing"));
   EXPECT_THAT(refusal("c.csv", "name,x,y,z,image,column_px,row_px,sigma_mm\n"), HasSubstr("unknown key 'sigma_mm'"));
   EXPECT_THAT(refusal("c.csv", header + "a,1,2,3,sub/0.jpg,x,4\n"),
               HasSubstr("c.csv:2: column_px: 'x' is not a number"));
   EXPECT_THAT(refusal("c.csv", header + "a,1,2,3,none.jpg,3,4\n"),
-              HasSubstr("c.csv:2: point 'a' is measured in image"));
+              HasSubstr("c.csv:2: the block has none of the images"));
   for (const char* sigma : {"0", "-1", "1e-300", "1e300"})
     EXPECT_THAT(refusal("c.csv", "name,x,y,z,image,column_px,row_px,sigma_px\na,1,2,3,sub/0.jpg,3,4," +
                                      std::string(sigma) + "\n"),
@@ -192,6 +192,90 @@ TEST_F(ControlFile, CsvRefusals) {
   EXPECT_THAT(refusal("c.csv", header + "a,1,2,3,sub/0.jpg,3,4\na,9,,,sub/1.jpg,3,4\n"), HasSubstr("another x"));
   EXPECT_THAT(refusal("c.csv", header + "a,1,2,3,sub/0.jpg,3,4,5\n"), HasSubstr("8 fields, but the header has only 7"));
   EXPECT_THAT(refusal("c.csv", "# crs: EPSG:32633\n" + header + "a,1e9,2,3,sub/0.jpg,3,4\n"), HasSubstr("c.csv:3"));
+}
+
+// One list as the programs of many people write it: shared/data/hard/controls, made of our own points.
+TEST_F(ControlFile, GcpListsOfEveryKindMeanTheSame) {
+  const std::vector<std::vector<std::string>> rows = {
+      {"391430.5", "5820112.25", "45.5", "10.5", "20", "sub/0.jpg", "a"},
+      {"391430.5", "5820112.25", "45.5", "11", "21.25", "sub/1.jpg", "a"},
+      {"391440", "5820100.75", "NaN", "30", "40", "sub/1.jpg", "b"}};
+  struct Kind {
+    std::string what, head = "WGS84 UTM 33N", between = " ", end = "\n";
+    std::function<std::string(std::string)> image = [](std::string name) { return name; };
+    std::string more = "";   // further lines
+    bool commas = false;     // decimal commas
+    std::string first = "";  // before everything
+  };
+  const auto upper = [](std::string name) {
+    for (char& c : name) c = static_cast<char>(std::toupper(c));
+    return name;
+  };
+  std::vector<Kind> kinds = {
+      {.what = "as ODM writes it"},
+      {.what = "byte order mark", .first = "\xef\xbb\xbf"},
+      {.what = "line ends of Windows", .end = "\r\n"},
+      {.what = "line ends of old Macs", .end = "\r"},
+      {.what = "tabs", .between = "\t"},
+      {.what = "commas", .between = ","},
+      {.what = "commas and blanks", .between = ", "},
+      {.what = "semicolons", .between = ";"},
+      {.what = "decimal commas", .between = ";", .commas = true},
+      {.what = "decimal commas between blanks", .commas = true},
+      {.what = "other case", .image = upper},
+      {.what = "folder", .image = [](std::string n) { return "images/" + n; }},
+      {.what = "folder of Windows", .image = [](std::string n) { return "D:\\x\\images\\" + n; }},
+      {.what = "without ending", .image = [](std::string n) { return n.substr(0, n.size() - 4); }},
+      {.what = "quotes", .image = [](std::string n) { return '"' + n + '"'; }},
+      {.what = "comment", .more = "# measured on Monday\n\n"}};
+  for (const char* head :
+       {"WGS84 UTM 33 N", "WGS 84 / UTM zone 33N", "+init=epsg:32633", "+init=epsg:32633 +no_defs", "EPSG:32633",
+        "epsg:32633", "EPSG::32633", "EPSG: 32633", "\"EPSG:32633\"", "EPSG:32633,,,,,,"})
+    kinds.push_back({.what = head, .head = head});
+  kinds.push_back({.what = "names of the columns", .head = "EPSG:32633\nX Y Z column row image name"});
+  for (const Kind& kind : kinds) {
+    std::string text = kind.first + kind.head + kind.end + kind.more;
+    for (std::vector<std::string> row : rows) {
+      row[5] = kind.image(row[5]);
+      for (std::size_t f = 0; f < row.size(); ++f) {
+        if (kind.commas && f < 5) std::replace(row[f].begin(), row[f].end(), '.', ',');
+        text += (f ? kind.between : "") + row[f];
+      }
+      text += kind.end;
+    }
+    const Project project = read("gcp_list.txt", text);
+    EXPECT_THAT(project.warnings, SizeIs(0)) << kind.what;
+    const auto& points = project.block.control_points;
+    ASSERT_THAT(points, SizeIs(2)) << kind.what;
+    const Eigen::Vector3d place = reference_.to_local(CrsToWgs84("EPSG:32633").to_wgs84({391430.5, 5820112.25, 45.5}));
+    EXPECT_LT((points[0].position - place).norm(), 1e-6) << kind.what;
+    ASSERT_THAT(points[0].measurements, SizeIs(2)) << kind.what;
+    EXPECT_EQ(points[0].measurements[1].pixel, Eigen::Vector2d(11.5, 21.75)) << kind.what;
+    EXPECT_EQ(project.block.name_of(points[0].measurements[1].image), "sub/1.jpg") << kind.what;
+    EXPECT_EQ(points[1].sigma.z(), 1000) << kind.what;
+  }
+}
+
+TEST_F(ControlFile, AMeasurementInAnAbsentImageIsAWarning) {
+  const std::string good = "13.4 52.52 40 5 6 sub/0.jpg a\n";
+  const Project project = read("gcp_list.txt", "WGS84\n" + good + "13.4 52.52 40 5 6 DSC7.jpg a\n");
+  EXPECT_THAT(project.block.control_points.at(0).measurements, SizeIs(1));
+  EXPECT_THAT(project.warnings,
+              ElementsAre(HasSubstr("gcp_list.txt:3: 1 measurement is not used, because the block has no image "
+                                    "'DSC7.jpg'; correct the name or delete the line")));
+  EXPECT_THAT(refusal("gcp_list.txt", "WGS84\n" + good + "13.4 52.52 40 5 6 SUB/0 a\n"),
+              HasSubstr("gcp_list.txt:3: point 'a' is measured twice"));
+  write_image_file(folder_.path("images/other/0.jpg"), 200, 100, 77);
+  EXPECT_THAT(refusal("gcp_list.txt", "WGS84\n13.4 52.52 40 5 6 0.jpg a\n"),
+              HasSubstr("several images of the block have this name; write it with its folder"));
+}
+
+TEST_F(ControlFile, GcpListAndOurOwnColumnsInACsvFile) {
+  EXPECT_THAT(read("points.csv", "WGS84;;;\n13,4;52,52;40;5;6;sub/0.jpg;a\n").block.control_points, SizeIs(1));
+  const Block block =
+      read("points.CSV", "\xef\xbb\xbfname;x;y;z;image;column_px;row_px\r\na;1,5;2;3;0.jpg;3,5;4\r\n").block;
+  EXPECT_EQ(block.control_points.at(0).position, Eigen::Vector3d(1.5, 2, 3));
+  EXPECT_EQ(block.control_points[0].measurements.at(0).pixel, Eigen::Vector2d(3.5, 4));
 }
 
 TEST_F(ControlFile, MeasurementsInImagesLeftOutAreWarnings) {
