@@ -9,6 +9,8 @@
 #include <mutex>
 
 #include "io/base/error.h"
+#include "io/images/header_fields.h"
+#include "io/images/header_pose.h"
 #include "io/images/sensor_table.h"
 
 namespace megablock {
@@ -21,89 +23,12 @@ std::mutex& exiv2_mutex() {
   return mutex;
 }
 
-std::string trimmed_exif(std::string text) {
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\0' || text.back() == '\n')) text.pop_back();
-  text.erase(0, text.find_first_not_of(' ') == std::string::npos ? text.size() : text.find_first_not_of(' '));
-  return text;
-}
-
-class ExifFields {
- public:
-  explicit ExifFields(const Exiv2::ExifData& data) : data_(data) {}
-
-  std::string text(const char* key) const {
-    const auto* value = find(key);
-    return value ? trimmed_exif(value->toString()) : "";
-  }
-  // Component n of a field; NaN if it is absent or its denominator is zero.
-  double number(const char* key, long n = 0) const {
-    const auto* value = find(key);
-    if (!value || n >= value->count()) return ImageHeader::kUnknown;
-    const Exiv2::TypeId type = value->typeId();
-    // Exiv2 returns both kinds as signed numbers, so unsigned values above 2^31 are converted back.
-    if (type == Exiv2::unsignedRational || type == Exiv2::signedRational) {
-      const Exiv2::Rational r = value->toRational(n);
-      const bool is_unsigned = type == Exiv2::unsignedRational;
-      const double top = is_unsigned ? static_cast<std::uint32_t>(r.first) : r.first;
-      const double bottom = is_unsigned ? static_cast<std::uint32_t>(r.second) : r.second;
-      return bottom != 0 ? top / bottom : ImageHeader::kUnknown;
-    }
-    return static_cast<double>(value->toFloat(n));
-  }
-
- private:
-  const Exiv2::Exifdatum* find(const char* key) const {
-    const auto found = data_.findKey(Exiv2::ExifKey(key));
-    return found != data_.end() ? &*found : nullptr;
-  }
-  const Exiv2::ExifData& data_;
-};
-
-// Finds XMP properties by their local name, whatever prefix the writer chose.
-double xmp_number(const Exiv2::XmpData& data, const std::string& group, const std::string& name) {
-  for (const auto& property : data) {
-    if (property.groupName() != group || property.tagName() != name) continue;
-    double value = ImageHeader::kUnknown;
-    return std::sscanf(property.toString().c_str(), "%lf", &value) == 1 ? value : ImageHeader::kUnknown;
-  }
-  return ImageHeader::kUnknown;
-}
-
-// Degrees from the three rationals degrees, minutes and seconds; the last two may be absent.
-double dms_degrees(const ExifFields& exif, const char* key) {
-  const double degrees = exif.number(key, 0), minutes = exif.number(key, 1), seconds = exif.number(key, 2);
-  return degrees + (std::isnan(minutes) ? 0 : minutes / 60) + (std::isnan(seconds) ? 0 : seconds / 3600);
-}
-
-void read_position(const ExifFields& exif, const Exiv2::XmpData& xmp, ImageHeader& header) {
-  double latitude = dms_degrees(exif, "Exif.GPSInfo.GPSLatitude");
-  double longitude = dms_degrees(exif, "Exif.GPSInfo.GPSLongitude");
-  if (std::isnan(latitude) || std::isnan(longitude)) return;
-  if (exif.text("Exif.GPSInfo.GPSLatitudeRef") == "S") latitude = -latitude;
-  if (exif.text("Exif.GPSInfo.GPSLongitudeRef") == "W") longitude = -longitude;
-  double height = exif.number("Exif.GPSInfo.GPSAltitude");
-  if (exif.number("Exif.GPSInfo.GPSAltitudeRef") == 1) height = -height;
-  if (std::isnan(height)) height = xmp_number(xmp, "drone-dji", "AbsoluteAltitude");
-  header.position = Geodetic{latitude, longitude, height};
-
-  header.dop = exif.number("Exif.GPSInfo.GPSDOP");
-  header.position_sigma_horizontal_m = exif.number("Exif.GPSInfo.0x001f");  // GPSHPositioningError
-  // RTK values are the standard deviations of this image and replace the general estimate.
-  const double east = xmp_number(xmp, "drone-dji", "RtkStdLon"), north = xmp_number(xmp, "drone-dji", "RtkStdLat");
-  const double up = xmp_number(xmp, "drone-dji", "RtkStdHgt");
-  if (east > 0 && north > 0) header.position_sigma_horizontal_m = std::max(east, north);
-  if (up > 0) header.position_sigma_vertical_m = up;
-}
-
-// The gimbal angles are those of the camera. Flight angles are those of the body and say nothing about a camera on a
-// gimbal. For a fixed camera they would need the assumption that it looks along the body's z axis, so they are not used
-// alone.
-void read_attitude(const Exiv2::XmpData& xmp, ImageHeader& header) {
-  const double yaw = xmp_number(xmp, "drone-dji", "GimbalYawDegree");
-  const double pitch = xmp_number(xmp, "drone-dji", "GimbalPitchDegree");
-  const double roll = xmp_number(xmp, "drone-dji", "GimbalRollDegree");
-  if (std::isnan(yaw) || std::isnan(pitch) || std::isnan(roll)) return;
-  header.attitude = ImageHeader::Attitude{yaw, pitch, roll};
+// Seconds since 1970 of a date and a time of day. NaN for a date that does not exist, or before 1900.
+double seconds_of(int year, int month, int day, double seconds_of_day) {
+  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
+                                         std::chrono::day(static_cast<unsigned>(day))};
+  if (!date.ok() || year < 1900) return ImageHeader::kUnknown;
+  return static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count()) * 86400 + seconds_of_day;
 }
 
 double read_time(const ExifFields& exif) {
@@ -111,16 +36,29 @@ double read_time(const ExifFields& exif) {
   int year, month, day, hour, minute, second;
   if (std::sscanf(text.c_str(), "%d:%d:%d %d:%d:%d", &year, &month, &day, &hour, &minute, &second) != 6)
     return ImageHeader::kUnknown;
-  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
-                                         std::chrono::day(static_cast<unsigned>(day))};
-  if (!date.ok() || year < 1900) return ImageHeader::kUnknown;
-  const double days = static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
-  double time = days * 86400 + hour * 3600 + minute * 60 + second;
+  double time = seconds_of(year, month, day, hour * 3600 + minute * 60 + second);
   const std::string fraction = exif.text("Exif.Photo.SubSecTimeOriginal");
   double value = 0;
   // The tag has the digits behind the decimal point: "05" are 50 ms.
   if (!fraction.empty() && std::sscanf(("0." + fraction).c_str(), "%lf", &value) == 1) time += value;
   return time;
+}
+
+double read_gps_time(const ExifFields& exif) {
+  const std::string date = exif.text("Exif.GPSInfo.GPSDateStamp");
+  int year, month, day;
+  if (std::sscanf(date.c_str(), "%d%*[:-]%d%*[:-]%d", &year, &month, &day) != 3) return ImageHeader::kUnknown;
+  const double hour = exif.number("Exif.GPSInfo.GPSTimeStamp", 0), minute = exif.number("Exif.GPSInfo.GPSTimeStamp", 1);
+  return seconds_of(year, month, day, hour * 3600 + minute * 60 + exif.number("Exif.GPSInfo.GPSTimeStamp", 2));
+}
+
+// OffsetTimeOriginal (0x9011): "+02:00".
+double read_zone(const ExifFields& exif) {
+  const std::string text = exif.text("Exif.Photo.0x9011");
+  char sign;
+  int hours, minutes;
+  if (std::sscanf(text.c_str(), "%c%2d:%2d", &sign, &hours, &minutes) != 3) return ImageHeader::kUnknown;
+  return (sign == '-' ? -1 : 1) * (hours * 3600.0 + minutes * 60.0);
 }
 
 void read_lens(const ExifFields& exif, ImageHeader& header) {
@@ -180,9 +118,10 @@ ImageHeader read_image_header(const std::string& path) {
     const double orientation = exif.number("Exif.Image.Orientation");
     if (orientation >= 1 && orientation <= 8) header.orientation = static_cast<int>(orientation);
     header.time_s = read_time(exif);
+    header.gps_time_s = read_gps_time(exif);
+    header.zone_s = read_zone(exif);
     read_lens(exif, header);
-    read_position(exif, image->xmpData(), header);
-    read_attitude(image->xmpData(), header);
+    read_header_pose(exif, XmpFields(image->xmpData()), header);
   } catch (const Exiv2::AnyError& error) {
     throw InputError(exiv2_reason(error));
   }

@@ -5,13 +5,12 @@
 //
 //     focal length   f_px = f_mm / width_mm * larger side: the width of the sensor counts along its larger side. With a
 //                    resolution of r pixels per unit it is pixels / r * (25.4 for inches, 10 for cm, 1 for mm).
-//     position       GPSLatitude and GPSLongitude are degrees, minutes, seconds without a sign, which is in the tags
-//                    ...Ref (S, W). GPSAltitudeRef 1 means a negative height. Heights count as ellipsoidal, WGS84.
-//     attitude       The angles of a gimbal in the XMP namespace drone-dji. They refer to north and to the vertical at
-//                    the image, as YawPitchRoll of geometry/transform/rotation.h.
+//     pose           io/images/header_pose.h
 //     time           DateTimeOriginal has no time zone; it is taken as UTC.
 #pragma once
 
+#include <Eigen/Geometry>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
@@ -31,17 +30,24 @@ struct ImageHeader {
   int orientation = 1;                // EXIF code
   double time_s = kUnknown;           // DateTimeOriginal with fractions, taken as UTC, seconds since 1970
 
-  std::optional<Geodetic> position;               // height NaN if absent
-  double position_sigma_horizontal_m = kUnknown;  // GPSHPositioningError, or RTK values; DOP only widens the default
+  // Of the GNSS time stamp, UTC, seconds since 1970; and DateTimeOriginal minus UTC, where the header says its zone.
+  double gps_time_s = kUnknown, zone_s = kUnknown;
+
+  std::optional<Geodetic> position;  // height NaN if absent
+  std::string position_source;       // for the user: "EXIF", "XMP (drone-dji)"
+  // Standard deviations that the header states; a DOP only widens the default.
+  double position_sigma_horizontal_m = kUnknown;
   double position_sigma_vertical_m = kUnknown;
   double dop = kUnknown;
+  // The kind of solution of an RTK receiver.
+  enum class Fix : std::uint8_t { kUnstated, kSingle, kFloat, kFixed } fix = Fix::kUnstated;
 
-  // Yaw, pitch and roll of the viewing direction (degrees) relative to the vertical at the frame's place, as a gimbal
-  // reports them.
   struct Attitude {
-    double yaw_deg, pitch_deg, roll_deg;
+    Eigen::Quaterniond rotation;  // from the axes east, north, up at the image to those of the camera
+    std::string source;           // for the user: "XMP (drone-dji)"
   };
   std::optional<Attitude> attitude;
+  double compass_deg = kUnknown;  // GPSImgDirection; it says nothing of pitch and roll
 };
 
 // Whether the name ends in jpg, jpeg, png, tif or tiff, in upper or lower case. Folders are searched for such files.

@@ -195,13 +195,11 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
   const double yaw = sigma_deg.value_or(kYawSigmaDeg) * kDegree;
   for (std::size_t i = 0; i < scanned.size(); ++i) {
     if (!scanned[i].header.attitude) continue;
-    const auto& angles = *scanned[i].header.attitude;
     const ImageIndex image(static_cast<std::int64_t>(i));
     Frame& frame = block.frames[block.images[image].frame];
     if (frame.attitude_prior) continue;
     AttitudePrior prior;
-    prior.rotation_cw =
-        rotation_from(YawPitchRoll{angles.yaw_deg * kDegree, angles.pitch_deg * kDegree, angles.roll_deg * kDegree});
+    prior.rotation_cw = scanned[i].header.attitude->rotation;
     if (frame.position_prior)
       prior.rotation_cw =
           (prior.rotation_cw * georeference.own_from_block(georeference.to_geodetic(frame.position_prior->position)))

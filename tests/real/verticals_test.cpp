@@ -35,9 +35,7 @@ Shown verticals_of(const std::string& set) {
     VerticalPrior prior;
     prior.down = down_of_exif_orientation(header.orientation);
     if (header.attitude) {
-      const auto& a = *header.attitude;
-      prior.down = rotation_from(YawPitchRoll{a.yaw_deg * kDegree, a.pitch_deg * kDegree, a.roll_deg * kDegree}) *
-                   -Eigen::Vector3d::UnitZ();
+      prior.down = header.attitude->rotation * -Eigen::Vector3d::UnitZ();
       prior.roll_sigma = prior.pitch_sigma = 3 * kDegree;
     }
     const ImageVertical v = find_image_vertical(file.string(), camera, prior, 1);

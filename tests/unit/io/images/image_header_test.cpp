@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include "geometry/numbers/angles.h"
+#include "geometry/transform/rotation.h"
 #include "io/base/error.h"
 #include "tests/support/io/image_files.h"
 #include "tests/support/io/scratch_directory.h"
@@ -51,9 +53,23 @@ TEST(ImageHeader, ReadsCameraTimeAndPosition) {
   EXPECT_DOUBLE_EQ(header.position_sigma_horizontal_m, 0.014);
   EXPECT_DOUBLE_EQ(header.position_sigma_vertical_m, 0.031);
   ASSERT_TRUE(header.attitude);
-  EXPECT_EQ(header.attitude->yaw_deg, 45);
-  EXPECT_EQ(header.attitude->pitch_deg, -89.9);
-  EXPECT_EQ(header.attitude->roll_deg, 0.5);
+  EXPECT_LT(rotation_angle(header.attitude->rotation,
+                           rotation_from(YawPitchRoll{45 * kDegree, -89.9 * kDegree, 0.5 * kDegree})),
+            1e-12);
+}
+
+TEST(ImageHeader, ReadsTheTimesOfReceiverAndZone) {
+  ScratchDirectory folder;
+  write_image_file(folder.path("a.jpg"), 64, 48, 1,
+                   {{"Exif.GPSInfo.GPSDateStamp", "2021:06:01"},
+                    {"Exif.GPSInfo.GPSTimeStamp", "10/1 20/1 3025/100"},
+                    {"Exif.Photo.DateTimeOriginal", "2021:06:01 12:20:31"},
+                    {"Exif.Photo.0x9011", "+02:00"}});
+  const ImageHeader header = read_image_header(folder.path("a.jpg"));
+  EXPECT_DOUBLE_EQ(header.gps_time_s, 1622542830.25);  // date -u -d '2021-06-01 10:20:30' +%s
+  EXPECT_DOUBLE_EQ(header.time_s - header.zone_s, 1622542831);
+  write_image_file(folder.path("b.jpg"), 64, 48, 1, {{"Exif.GPSInfo.GPSDateStamp", "2021:13:01"}});
+  EXPECT_TRUE(std::isnan(read_image_header(folder.path("b.jpg")).gps_time_s));
 }
 
 TEST(ImageHeader, FocalLengthByEachWay) {
