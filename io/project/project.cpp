@@ -145,7 +145,8 @@ void read_block_sections(YamlReader& top, Project& project, const std::vector<Se
   const auto control = read_control(top);
   std::vector<Geodetic> others = poses ? poses->positions() : std::vector<Geodetic>();
   if (control && others.empty()) others = geodetic_positions(*control);
-  read_positions(top, scanned, others, ground, project);
+  const bool from_files = read_position_files(top, scanned, project);
+  read_positions(top, scanned, from_files, others, ground, project);
   read_attitudes(top, scanned, project);
   if (poses) set_given_poses(*poses, names_left_out(project), project.block, project.warnings);
   if (control) add_control(*control, names_left_out(project), project.block, project.warnings);

@@ -7,8 +7,9 @@
 //                  then the guess of 1.2 times the larger side
 //     mounts       `calibration`, then the file of rig cameras
 //     mask         the key `mask` of the camera, then the folder `masks`
-//     position     of a rig, that of its first image with one. Its sigmas: `gps`, then the RTK values or
-//                  GPSHPositioningError of the header, then DOP or the default
+//     position     `positions`, then the image headers; of a rig, that of its first image with one. Its sigmas: `gps`,
+//                  then the file, its section or the header, then DOP or the default
+//     attitude     `positions`, then the image headers
 //     ground       that of the running job, then `origin`, then the median of the positions, of `poses`, of `control`
 //     given pose   the row of the frame, then that of its first image in the file
 //     control      the keys beside `control: file`, then the columns of the file, then the defaults
@@ -32,6 +33,7 @@ struct Project {
   std::vector<std::pair<std::string, std::string>> unreadable;  // image files that were skipped, with the reason
   std::vector<std::string> copies;    // image files that were left out because an earlier one has the same bytes
   std::vector<std::string> missing;   // images and exposures that the assignments of rigs name and that do not exist
+  std::vector<std::string> found;     // where positions and attitudes of images come from, with sigmas; one line each
   std::vector<std::string> warnings;  // one line each: GPS at 0, 0, copies, outliers, ...
 };
 

@@ -10,7 +10,9 @@
 
 #include "io/base/error.h"
 #include "io/base/file_error.h"
+#include "io/project/input_search.h"
 #include "io/project/project.h"
+
 namespace megablock {
 
 namespace fs = std::filesystem;
@@ -37,14 +39,66 @@ std::string quoted(const std::string& text) {
   return result + "\"";
 }
 
-std::string head(const InitOptions& options, const fs::path& folder) {
+// A file that was found beside the images, and the reason why it is not used; empty: it is used.
+struct Candidate {
+  FoundInput input;
+  std::string refused;
+};
+
+std::string value_of(const FoundInput& input, const fs::path& folder) {
+  const std::string file = quoted(path_for(input.files[0], folder));
+  if (input.files.size() == 1) return file;
+  return "{file: " + file + ", exposures: " + quoted(path_for(input.files[1], folder)) + "}";
+}
+
+// The keys `control` and `positions` of what was found. Files that do not fit stand in comments with the reason.
+std::string lines_of_inputs(const std::vector<Candidate>& candidates, const fs::path& folder) {
+  std::string text;
+  std::vector<const Candidate*> positions;
+  for (const Candidate& candidate : candidates) {
+    const std::string value = value_of(candidate.input, folder);
+    if (!candidate.refused.empty())
+      text += "# " + candidate.input.key + ": " + value + "  # " + candidate.input.describe +
+              "; not used: " + candidate.refused + "\n";
+    else if (candidate.input.key == "positions")
+      positions.push_back(&candidate);
+    else
+      text += candidate.input.key + ": " + value + "\n";
+  }
+  if (positions.size() == 1)
+    return text + "positions: " + value_of(positions[0]->input, folder) + "  # " + positions[0]->input.describe + "\n";
+  if (!positions.empty()) text += "positions:\n";
+  for (const Candidate* candidate : positions)
+    text += "  - " + value_of(candidate->input, folder) + "  # " + candidate->input.describe + "\n";
+  return text;
+}
+
+std::string head(const InitOptions& options, const std::vector<Candidate>& candidates, const fs::path& folder) {
   std::string text =
       "# Project of an image block; all keys: reference/project-file.md in share/doc/megablock/docs of the "
       "installation\nimages: " +
       quoted(path_for(options.images, folder)) + "\n";
   if (!options.mask_folder.empty()) text += "masks: " + quoted(path_for(options.mask_folder, folder)) + "\n";
   if (!options.gcp_file.empty()) text += "control: " + quoted(path_for(options.gcp_file, folder)) + "\n";
-  return text + "cameras:\n  grouping: " + options.camera_grouping + "\n";
+  return text + lines_of_inputs(candidates, folder) + "cameras:\n  grouping: " + options.camera_grouping + "\n";
+}
+
+std::vector<Candidate> candidates_of(const InitOptions& options) {
+  std::vector<Candidate> candidates;
+  for (const FoundInput& input : find_inputs(options.images))
+    if (input.key != "control" || options.gcp_file.empty()) candidates.push_back({input, ""});
+  return candidates;
+}
+
+// Marks the candidate that a message is about. Returns false if it is about none.
+bool refuse_candidate(std::vector<Candidate>& candidates, const std::string& message) {
+  for (Candidate& candidate : candidates)
+    for (const std::string& file : candidate.input.files) {
+      if (!candidate.refused.empty() || message.find(file) == std::string::npos) continue;
+      candidate.refused = message;
+      return true;
+    }
+  return false;
 }
 
 std::string found_text(const Project& project) {
@@ -55,6 +109,7 @@ std::string found_text(const Project& project) {
                   camera.focal_known ? "from the image headers" : "a guess: 1.2 x the larger side");
     text << "  # " << quoted(camera.name) << ":\n" << line;
   }
+  for (const std::string& line : project.found) text << "# " << line << "\n";
   const GroundFrame& ground = project.block.ground;
   if (ground.georeferenced) {
     char line[160];
@@ -65,7 +120,8 @@ std::string found_text(const Project& project) {
   return text.str();
 }
 
-std::string summary(const Project& project, const std::string& output) {
+std::string summary(const Project& project, const std::vector<Candidate>& candidates, const fs::path& folder,
+                    const std::string& output) {
   std::int64_t positions = 0, attitudes = 0;
   for (const Frame& frame : project.block.frames) {
     positions += frame.position_prior.has_value();
@@ -78,6 +134,12 @@ std::string summary(const Project& project, const std::string& output) {
   if (!project.block.control_points.empty()) text << ", " << project.block.control_points.size() << " control points";
   if (!project.unreadable.empty()) text << ", " << project.unreadable.size() << " unreadable files left out";
   text << ".";
+  for (const std::string& line : project.found) text << "\n" << line;
+  for (const Candidate& candidate : candidates) {
+    text << "\nfound: " << candidate.input.key << ": " << path_for(candidate.input.files[0], folder) << " ("
+         << candidate.input.describe << ")";
+    if (!candidate.refused.empty()) text << ", not used: " << candidate.refused;
+  }
   for (const auto& [name, reason] : project.unreadable) text << "\nunreadable: " << name << ": " << reason;
   for (const std::string& warning : project.warnings) text << "\nwarning: " << warning;
   return text.str();
@@ -99,24 +161,30 @@ std::string init_project(const InitOptions& options) {
   const fs::path output = fs::absolute(options.output).lexically_normal();
   if (fs::exists(output, error))
     throw InputError("'" + options.output + "' exists already; remove it or choose another name with -o");
-  // The draft is read by the reader of project files, so `run` will later understand the file in the same way.
-  const fs::path draft = output.string() + ".draft";
-  const std::string text = head(options, output.parent_path());
-  write_file(draft, text);
-  try {
-    const Project project = read_project(draft.string());
-    write_file(output, text + found_text(project));
-    fs::remove(draft, error);
-    return summary(project, options.output);
-  } catch (const InputError& wrong) {
-    fs::remove(draft, error);
-    // A place in the draft says nothing to the user, who has never seen this file.
-    const std::string message = wrong.what(), place = draft.string() + ":";
-    const std::size_t end = message.find(": ");
-    throw InputError(message.starts_with(place) && end != std::string::npos ? message.substr(end + 2) : message);
-  } catch (...) {
-    fs::remove(draft, error);
-    throw;
+  // The draft is read by the reader of project files, so `run` will later understand the file in the same way. Files
+  // that were found and do not fit are left to the user.
+  const fs::path draft = output.string() + ".draft", folder = output.parent_path();
+  std::vector<Candidate> candidates = candidates_of(options);
+  while (true) {
+    const std::string text = head(options, candidates, folder);
+    write_file(draft, text);
+    try {
+      const Project project = read_project(draft.string());
+      write_file(output, text + found_text(project));
+      fs::remove(draft, error);
+      return summary(project, candidates, folder, options.output);
+    } catch (const InputError& wrong) {
+      fs::remove(draft, error);
+      // A place in the draft says nothing to the user, who has never seen this file.
+      std::string message = wrong.what();
+      const std::string place = draft.string() + ":";
+      const std::size_t end = message.find(": ");
+      if (message.starts_with(place) && end != std::string::npos) message = message.substr(end + 2);
+      if (!refuse_candidate(candidates, message)) throw InputError(message);
+    } catch (...) {
+      fs::remove(draft, error);
+      throw;
+    }
   }
 }
 

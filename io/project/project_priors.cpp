@@ -20,6 +20,7 @@
 #include "io/base/error.h"
 #include "io/block/crs.h"
 #include "io/block/held_priors.h"
+#include "io/project/pose_sources.h"
 #include "io/project/project_sections.h"
 #include "io/text/plausible.h"
 
@@ -65,7 +66,7 @@ GpsOptions read_gps_options(YamlReader& top, bool from_images) {
 
 // The sigmas of a position: those of the project file, else the accuracy in the image header, else the defaults. A DOP
 // can only enlarge the default; it is taken as metres, because phones write their accuracy there.
-Eigen::Vector3d position_sigma(const ImageHeader& header, const GpsOptions& options) {
+Eigen::Vector3d position_sigma(const ImageHeader& header, bool has_height, const GpsOptions& options) {
   const double own = header.position_sigma_horizontal_m;
   double horizontal = own > 0 ? own : kDefaultHorizontalSigma;
   if (!(own > 0) && header.dop > horizontal) horizontal = header.dop;
@@ -73,28 +74,54 @@ Eigen::Vector3d position_sigma(const ImageHeader& header, const GpsOptions& opti
   if (!(vertical > 0)) vertical = horizontal * (kDefaultVerticalSigma / kDefaultHorizontalSigma);
   horizontal = options.sigma_horizontal.value_or(horizontal);
   vertical = options.sigma_vertical.value_or(vertical);
-  if (!std::isfinite(header.position->height_m)) vertical = kUnknownHeightSigma;
+  if (!has_height) vertical = kUnknownHeightSigma;
   return {horizontal, horizontal, vertical};
 }
 
-void set_position_priors(const std::vector<ScannedImage>& scanned,
-                         const std::vector<std::optional<Geodetic>>& positions, const GpsOptions& options,
-                         Block& block) {
-  const Georeference georeference(block.ground);
+// Sets the priors of the frames, and returns the sigmas used for each image: horizontal, vertical.
+std::vector<Eigen::Vector2d> set_position_priors(const std::vector<ScannedImage>& scanned,
+                                                 const std::vector<std::optional<Geodetic>>& positions,
+                                                 const GpsOptions& options, Block& block) {
+  std::vector<Eigen::Vector2d> sigmas(scanned.size(), Eigen::Vector2d::Constant(ImageHeader::kUnknown));
+  std::optional<Georeference> georeference;
+  if (block.ground.georeferenced) georeference.emplace(block.ground);
   for (std::size_t i = 0; i < scanned.size(); ++i) {
-    if (!positions[i]) continue;
-    ImageHeader header = scanned[i].header;
-    header.position = positions[i];
-    Geodetic position = *positions[i];
-    // An unknown height gets that of the origin, and a sigma that leaves it free (position_sigma).
-    if (!std::isfinite(position.height_m)) position.height_m = block.ground.height_m;
+    const auto& local = scanned[i].local_position;
+    if (!local && (!positions[i] || !georeference)) continue;
     PositionPrior prior;
-    prior.position = georeference.to_local(position);
-    prior.sigma = position_sigma(header, options);
+    bool has_height = true;
+    if (local) {
+      prior.position = *local;
+    } else {
+      Geodetic position = *positions[i];
+      // An unknown height gets that of the origin, and a sigma that leaves it free (position_sigma).
+      has_height = std::isfinite(position.height_m);
+      if (!has_height) position.height_m = block.ground.height_m;
+      prior.position = georeference->to_local(position);
+    }
+    prior.sigma = position_sigma(scanned[i].header, has_height, options);
     prior.lever_arm = options.lever_arm;
+    sigmas[i] = {prior.sigma.x(), prior.sigma.z()};
     Frame& frame = block.frames[block.images[ImageIndex(static_cast<std::int64_t>(i))].frame];
     if (!frame.position_prior) frame.position_prior = prior;  // in a rig, the first image with a position counts
   }
+  return sigmas;
+}
+
+// Whether several images have one and the same position: a receiver without updates, or a tripod. It is then one
+// observation of the whole block, which places the block and tells nothing of its scale and direction.
+bool share_one_position(const std::vector<Geodetic>& known) {
+  return known.size() > 1 && std::ranges::all_of(known, [&](const Geodetic& p) {
+           return p.latitude_deg == known[0].latitude_deg && p.longitude_deg == known[0].longitude_deg;
+         });
+}
+
+std::string text_of_one_position(const std::vector<Geodetic>& known, std::size_t images) {
+  return fmt::format(
+      "{} of {} images share one position ({:.6f}, {:.6f}), as from a receiver without updates; it is used as one, as "
+      "the "
+      "origin of the block. Positions of the images ('positions') or control points give scale and direction",
+      known.size(), images, known[0].latitude_deg, known[0].longitude_deg);
 }
 
 // Complains of a section that has no effect. With a given block, which never changes, it is an error. With images, it
@@ -113,6 +140,11 @@ GroundFrame ground_at(const Geodetic& origin) {
   return {true, origin.latitude_deg, origin.longitude_deg, origin.height_m, "EPSG:4979"};
 }
 
+Geodetic known_height(Geodetic position) {
+  if (!std::isfinite(position.height_m)) position.height_m = 0;
+  return position;
+}
+
 std::optional<GroundFrame> read_origin(YamlReader& top) {
   const auto origin = top.numbers("origin", 3);
   if (!origin) return std::nullopt;
@@ -126,21 +158,28 @@ std::optional<GroundFrame> read_origin(YamlReader& top) {
 
 }  // namespace
 
-void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, const std::vector<Geodetic>& others,
-                    const std::optional<GroundFrame>& ground, Project& project) {
+void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, bool from_files,
+                    const std::vector<Geodetic>& others, const std::optional<GroundFrame>& ground, Project& project) {
   Block& block = project.block;
   const bool from_images = !scanned.empty();  // otherwise a given block, which has its own ground frame
   const GpsOptions options = read_gps_options(top, from_images);
   const auto origin = read_origin(top);
   if (!options.use)
     for (Frame& frame : block.frames) frame.position_prior.reset();
+  const bool local =
+      std::ranges::any_of(scanned, [](const ScannedImage& image) { return image.local_position.has_value(); });
   std::vector<std::optional<Geodetic>> positions(scanned.size());
-  if (options.use) positions = screen_positions(scanned, project.warnings);
+  if (options.use || from_files) positions = screen_positions(scanned, project.warnings);
   std::vector<Geodetic> known;
   for (const auto& position : positions)
     if (position) known.push_back(*position);
+  if (local && !known.empty())
+    throw InputError(
+        top.where("positions") +
+        ": positions: some files are in the block's own frame and some in a system on earth; give all of them "
+        "in one kind");
   if (options.given && options.use) {
-    const bool has_effect = from_images ? !known.empty() : std::ranges::any_of(block.frames, has_position);
+    const bool has_effect = from_images ? !known.empty() || local : std::ranges::any_of(block.frames, has_position);
     check_effect(top, "gps", "positions", from_images, has_effect, project.warnings);
   }
   for (Frame& frame : block.frames) {
@@ -151,21 +190,26 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, c
   if (origin && !from_images)
     throw InputError(top.where("origin") +
                      ": 'origin' cannot be given with 'block', which has its own ground frame; remove it");
+  const bool one = share_one_position(known);
   // The order of project_sections.h: the running job, `origin`, the images, other positions.
   if (ground && from_images)
     block.ground = *ground;
   else if (origin)
     block.ground = *origin;
   else if (!known.empty())
-    block.ground = ground_at(rounded_median(known));
+    block.ground = ground_at(one ? known_height(known[0]) : rounded_median(known));
   else if (!others.empty() && !block.ground.georeferenced)
     block.ground = ground_at(rounded_median(others));
-  if (!known.empty() && !block.ground.georeferenced) {
+  if (!from_images) return;
+  if (!known.empty() && !block.ground.georeferenced)
     project.warnings.push_back(
         "GPS positions are not used, because the block of this job is not georeferenced; start a new job to use them");
-    return;
+  if (one) {
+    positions.assign(scanned.size(), std::nullopt);
+    project.warnings.push_back(text_of_one_position(known, scanned.size()));
   }
-  if (!known.empty()) set_position_priors(scanned, positions, options, block);
+  const auto sigmas = set_position_priors(scanned, positions, options, block);
+  project.found = lines_of_positions(scanned, sigmas);
 }
 
 void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, Project& project) {
@@ -180,7 +224,7 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
   }
   Block& block = project.block;
   if (given && use) {
-    const auto tells = [](const ScannedImage& image) { return image.header.attitude.has_value(); };
+    const auto tells = [](const ScannedImage& image) { return image.header.attitude || image.local_attitude; };
     const bool has_effect =
         from_images ? std::ranges::any_of(scanned, tells) : std::ranges::any_of(block.frames, has_attitude);
     check_effect(top, "attitude", "attitudes", from_images, has_effect, project.warnings);
@@ -189,20 +233,24 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
     for (Frame& frame : block.frames) frame.attitude_prior.reset();
   for (Frame& frame : block.frames)
     if (frame.attitude_prior && sigma_deg) frame.attitude_prior->sigma_rad.setConstant(*sigma_deg * kDegree);
-  if (!use || !from_images || !block.ground.georeferenced) return;
-  const Georeference georeference(block.ground);
+  if (!from_images) return;
+  std::optional<Georeference> georeference;
+  if (block.ground.georeferenced) georeference.emplace(block.ground);
+  std::vector<bool> used(scanned.size(), false);
   const double tilt = sigma_deg.value_or(kTiltSigmaDeg) * kDegree;
   const double yaw = sigma_deg.value_or(kYawSigmaDeg) * kDegree;
   for (std::size_t i = 0; i < scanned.size(); ++i) {
-    if (!scanned[i].header.attitude) continue;
+    const auto& local = scanned[i].local_attitude;
+    if (!use || (!local && (!scanned[i].header.attitude || !georeference))) continue;
+    used[i] = true;
     const ImageIndex image(static_cast<std::int64_t>(i));
     Frame& frame = block.frames[block.images[image].frame];
     if (frame.attitude_prior) continue;
     AttitudePrior prior;
-    prior.rotation_cw = scanned[i].header.attitude->rotation;
-    if (frame.position_prior)
+    prior.rotation_cw = local ? *local : scanned[i].header.attitude->rotation;
+    if (frame.position_prior && !local)
       prior.rotation_cw =
-          (prior.rotation_cw * georeference.own_from_block(georeference.to_geodetic(frame.position_prior->position)))
+          (prior.rotation_cw * georeference->own_from_block(georeference->to_geodetic(frame.position_prior->position)))
               .normalized();
     prior.rotation_cw = (block.mount_of(image).pose.rotation.conjugate() * prior.rotation_cw).normalized();
     // The heading is less accurate than the vertical. The variances about the ground axes (tilt, tilt, yaw) are
@@ -213,6 +261,8 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
     prior.sigma_rad = (r * variance.asDiagonal() * r.transpose()).diagonal().cwiseSqrt();
     frame.attitude_prior = prior;
   }
+  const auto lines = lines_of_attitudes(scanned, used, tilt * kDegreesPerRadian, yaw * kDegreesPerRadian);
+  project.found.insert(project.found.end(), lines.begin(), lines.end());
 }
 
 }  // namespace megablock

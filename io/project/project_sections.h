@@ -34,10 +34,14 @@ std::optional<ApproximatePoses> read_poses(YamlReader& top);
 // control: a file, or a mapping with the file and settings that override it.
 std::optional<ControlTable> read_control(YamlReader& top);
 
+// positions: files of positions of images, which take the place of those in the headers. Returns whether there are any.
+bool read_position_files(YamlReader& top, std::vector<ScannedImage>& scanned, Project& project);
+
 // gps, origin: sets the position priors and chooses the ground frame. This is `ground` (that of a running job), else
 // that of `origin`, else one about the positions of the images, else one about the `others` (of poses and control).
-void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, const std::vector<Geodetic>& others,
-                    const std::optional<GroundFrame>& ground, Project& project);
+// `from_files`: the positions are those of files, which count also with `gps: {use: false}`.
+void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, bool from_files,
+                    const std::vector<Geodetic>& others, const std::optional<GroundFrame>& ground, Project& project);
 
 // attitude: sets the attitude priors from the angles of the images, turned to the vertical of the block's origin.
 void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, Project& project);

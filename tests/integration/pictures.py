@@ -2,7 +2,7 @@
 import struct
 import zlib
 
-GPS_LATITUDE_REF, GPS_LATITUDE, GPS_LONGITUDE_REF, GPS_LONGITUDE = 1, 2, 3, 4
+GPS_LATITUDE_REF, GPS_LATITUDE, GPS_LONGITUDE_REF, GPS_LONGITUDE, GPS_ALTITUDE = 1, 2, 3, 4, 6
 GPS_INFO = 0x8825
 
 
@@ -38,6 +38,10 @@ class Exif:
         sign = {tag: -1 if self.data[self.start + self.gps[tag]] in b"SW" else 1
                 for tag in (GPS_LATITUDE_REF, GPS_LONGITUDE_REF)}
         return (sign[GPS_LATITUDE_REF] * self.angle(GPS_LATITUDE), sign[GPS_LONGITUDE_REF] * self.angle(GPS_LONGITUDE))
+
+    def height(self):
+        """Metres."""
+        return self.at("I", self.start + self.gps[GPS_ALTITUDE]) / self.at("I", self.start + self.gps[GPS_ALTITUDE] + 4)
 
     def set_position(self, latitude, longitude):
         for value, tag, reference, letters in ((latitude, GPS_LATITUDE, GPS_LATITUDE_REF, b"NS"),

@@ -23,7 +23,7 @@ CODES_ALLOWED = ("docs/reference/methods.md", "tests/")
 # (word, what to say instead, contexts in which it is ordinary English)
 WORDS = [
     (r"\bpictures?\b", "image", r"(with|as|draws?|see|this) (a|an|the) picture\b|picture \(SVG"),
-    (r"\bphotos?\b", "image", r"Exif\.Photo"),
+    (r"\bphotos?\b", "image", r"Exif\.Photo|\"photo\""),
     (r"\bstations?\b", "frame", r"scan(ner)? stations?|(base|total|reference|weather) stations?"),
     (r"\bstrays?\b", "outlier", None),
     (r"\bsights?\b", "observation", r"(in|out of|at first|lines? of) sight"),

@@ -1,0 +1,48 @@
+// Reads rows of tables whose header names the columns, in the words of many programs. Internal to io/.
+//
+// The fields are
+//
+//     image                                       name of the image
+//     latitude, longitude, height                 degrees, metres; or
+//     x, y, z                                     easting or longitude, northing or latitude, height in the system
+//     sigma_horizontal, sigma_x, sigma_y          metres; the larger of the last two stands for the first
+//     sigma_vertical, sigma                       metres; the last one stands for whatever else is not given
+//     yaw, pitch, roll                            degrees (kBody), or gimbal_yaw, ... (kGimbal), or omega, phi, kappa
+//
+// A name of a column is compared in lower case, without units in brackets, with '_' for everything that is no letter or
+// digit, and without the ending _m or _deg.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "io/project/positions/position_table.h"
+#include "io/text/text_lines.h"
+
+namespace megablock {
+
+class PositionColumns {
+ public:
+  PositionColumns() = default;
+  // Finds the fields among the names of a header.
+  explicit PositionColumns(const std::vector<std::string>& header);
+
+  bool has(const std::string& field) const { return place_.contains(field); }
+  bool has_place() const;  // latitude and longitude, or x and y
+  bool geodetic() const;   // latitude and longitude
+  void set(const std::string& field, std::size_t column) { place_[field] = column; }
+
+  // The row of a line; nothing if it has no image or no coordinates, as programs write images without position.
+  // `other`: what yaw, pitch and roll are, if not kBody. Throws InputError for values that are not numbers.
+  std::optional<PositionTable::Row> row(const std::vector<std::string>& fields, Separator separator,
+                                        const std::string& where, std::optional<AngleKind> other = {}) const;
+
+  static bool is_field(const std::string& name);
+  static std::string fields();  // all names, for messages
+
+ private:
+  std::map<std::string, std::size_t> place_;  // field -> column
+};
+
+}  // namespace megablock

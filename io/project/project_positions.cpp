@@ -1,0 +1,388 @@
+// Reads the section `positions` of the project file: files of positions (and attitudes) of images that other programs
+// wrote. Their values take the place of those in the image headers, so that everything behind treats both alike.
+//
+// With P(place) the WGS84 position of a row and E its axes east, north, up, a row with the offset o of the camera from
+// the antenna gives the position P + E' o. Angles of the kinds kBody and kGimbal refer to true north. Omega, phi and
+// kappa refer to the axes of the grid, in which true north has the bearing g (the convergence of the meridians):
+//
+//     R_own = R_grid M,    M = [cos g, sin g; -sin g, cos g] in the plane,
+//
+// because M turns the axes east, north at the image into those of the grid.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+
+#include "geometry/numbers/angles.h"
+#include "geometry/numbers/median.h"
+#include "geometry/transform/body_attitude.h"
+#include "geometry/transform/rotation.h"
+#include "io/base/error.h"
+#include "io/project/inputs/image_lookup.h"
+#include "io/project/positions/exposures.h"
+#include "io/project/positions/position_columns.h"
+#include "io/project/positions/position_fields.h"
+#include "io/project/positions/position_formats.h"
+#include "io/project/project_sections.h"
+
+namespace megablock {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double kTimeSigma = 0.3;     // s, of times in whole seconds
+constexpr double kFarFromHeader = 50;  // m; single GNSS positions and rounded coordinates are nearer
+
+// One file with what the project says of it.
+struct PositionSource {
+  std::string path, exposures, folder, where;
+  PositionOptions options;
+  std::optional<double> sigma_horizontal, sigma_vertical;
+  double time_offset_s = kNoNumber;
+};
+
+AngleKind angle_kind(const std::string& text, const std::string& where) {
+  if (text == "yaw_pitch_roll") return AngleKind::kBody;
+  if (text == "gimbal") return AngleKind::kGimbal;
+  if (text == "omega_phi_kappa") return AngleKind::kOmegaPhiKappa;
+  throw InputError(where + ": angles: '" + text + "' is not one of: yaw_pitch_roll, gimbal, omega_phi_kappa");
+}
+
+PositionSource read_source(YamlReader reader) {
+  PositionSource source;
+  source.where = reader.where();
+  const auto file = reader.existing_file("file");
+  if (!file)
+    throw InputError(reader.where() + ": key 'file' is missing in 'positions'; write 'positions: {file: geo.txt}'");
+  source.path = *file;
+  source.exposures = reader.existing_file("exposures").value_or("");
+  source.folder = reader.text("images").value_or("");
+  source.options.format = reader.text("format").value_or("");
+  source.options.crs = reader.text("crs").value_or("");
+  if (const auto angles = reader.text("angles")) source.options.angles = angle_kind(*angles, reader.where("angles"));
+  if (auto columns = reader.mapping("columns"))
+    for (const std::string& field : columns->keys()) {
+      if (!PositionColumns::is_field(field))
+        throw InputError(columns->where(field) + ": columns: '" + field +
+                         "' is not one of: " + PositionColumns::fields());
+      source.options.columns[field] = *columns->text(field);
+    }
+  source.sigma_horizontal = reader.number("sigma_horizontal_m", kSigmaMetres);
+  source.sigma_vertical = reader.number("sigma_vertical_m", kSigmaMetres);
+  source.time_offset_s = reader.number("time_offset_s").value_or(kNoNumber);
+  reader.finish();
+  return source;
+}
+
+std::vector<PositionSource> read_sources(YamlReader& top) {
+  const auto node = top.node("positions");
+  std::vector<PositionSource> sources;
+  const auto add = [&](const YAML::Node& item) {
+    if (item.IsMap()) {
+      sources.push_back(read_source(YamlReader(item, top.file(), "positions")));
+      return;
+    }
+    PositionSource source;
+    source.where = top.where("positions");
+    if (!item.IsScalar())
+      throw InputError(source.where + ": positions must be a file, a mapping with 'file', or a list of these");
+    source.path = top.absolute(item.Scalar());
+    if (!fs::is_regular_file(source.path))
+      throw InputError(source.where + ": positions: file '" + item.Scalar() + "' does not exist; check the path");
+    sources.push_back(source);
+  };
+  if (node && node->IsSequence())
+    for (const YAML::Node& item : *node) add(item);
+  else if (node)
+    add(*node);
+  return sources;
+}
+
+ImageTime time_of_image(const ScannedImage& image) {
+  const ImageHeader& header = image.header;
+  ImageTime time{image.name, kNoNumber, header.time_s};
+  double utc = header.gps_time_s;
+  if (std::isnan(utc)) utc = header.time_s - header.zone_s;
+  time.gps_s = utc + leap_seconds(utc);
+  return time;
+}
+
+// The images that exposures may belong to: those of the folder that the project names, else those beside the file if
+// there are any, else all.
+std::vector<std::size_t> images_of_source(const PositionSource& source, const std::string& file,
+                                          const std::vector<ScannedImage>& scanned) {
+  std::vector<std::size_t> images, beside;
+  const fs::path folder = fs::path(file).parent_path();
+  for (std::size_t i = 0; i < scanned.size(); ++i) {
+    if (source.folder.empty() || scanned[i].name.starts_with(source.folder + "/")) images.push_back(i);
+    if (fs::path(scanned[i].path).parent_path() == folder) beside.push_back(i);
+  }
+  if (images.empty())
+    throw InputError(source.where + ": images: the block has no image in folder '" + source.folder + "'");
+  return source.folder.empty() && !beside.empty() ? beside : images;
+}
+
+// Metres per second along the path at a time, from the positions half a second before and after.
+double speed_at(const PositionTable& path, double time, bool degrees) {
+  const std::vector<PositionTable::Row> rows = interpolate(path, {time - 0.5, time + 0.5});
+  if (rows[0].where.empty() || rows[1].where.empty()) return 0;
+  Eigen::Vector3d step = rows[1].place - rows[0].place;
+  constexpr double kMetresPerDegree = 111320;  // along meridians and along the equator, to one per cent
+  if (degrees) {
+    step.x() *= kMetresPerDegree * std::cos(rows[0].place.y() * kDegree);
+    step.y() *= kMetresPerDegree;
+  }
+  return step.norm();
+}
+
+// Gives every row its image.
+class RowsOfImages {
+ public:
+  RowsOfImages(const PositionSource& source, const std::vector<ScannedImage>& scanned, Project& project)
+      : source_(source), scanned_(scanned), project_(project) {}
+
+  // [images]; no value: the file has no row for the image.
+  std::vector<std::optional<PositionTable::Row>> find(const ImageLookup& lookup) {
+    PositionTable table = read_position_table(source_.path, source_.options);
+    std::string file = source_.path;
+    if (!source_.exposures.empty()) {
+      const PositionTable exposures = read_position_table(source_.exposures, {});
+      if (exposures.kind != PositionTable::Kind::kExposures || table.kind == PositionTable::Kind::kImages)
+        throw InputError(source_.where +
+                         ": 'exposures' is for a _Timestamp.MRK of DJI beside 'file' with a solution of RTKLIB");
+      table = exposures_on(table, exposures, source_.path, table.notes);
+      file = source_.exposures;
+    } else {
+      // Offsets of exposures belong to the antenna. DJI has applied them to its own positions.
+      for (PositionTable::Row& row : table.rows) row.offset_m.setZero();
+    }
+    crs_ = table.crs;
+    rows_.resize(scanned_.size());
+    if (table.kind == PositionTable::Kind::kImages)
+      by_name(table, lookup);
+    else if (table.kind == PositionTable::Kind::kExposures)
+      by_exposure(table, file);
+    else
+      by_time(table);
+    for (const std::string& note : table.notes) project_.warnings.push_back(note);
+    return std::move(rows_);
+  }
+
+  const std::string& crs() const { return crs_; }
+
+ private:
+  void by_name(const PositionTable& table, const ImageLookup& lookup) {
+    std::size_t absent = 0, used = 0;
+    const PositionTable::Row* first_absent = nullptr;
+    for (const PositionTable::Row& row : table.rows) {
+      const ImageLookup::Found found = lookup.find(row.image);
+      if (found.kind == ImageLookup::Kind::kAmbiguous)
+        throw InputError(row.where + ": several images of the block have the name '" + row.image +
+                         "'; write it with its folder");
+      if (found.kind != ImageLookup::Kind::kImage) {
+        if (absent++ == 0) first_absent = &row;
+        continue;
+      }
+      auto& place = rows_[static_cast<std::size_t>(found.image.value)];
+      if (place)
+        throw InputError(row.where + ": image '" + row.image + "' has a position in " + place->where +
+                         " already; delete one of the lines");
+      place = row;
+      ++used;
+    }
+    if (used == 0)
+      throw InputError(first_absent->where + ": the block has none of the images of this file (the first is '" +
+                       first_absent->image + "'); give the file that belongs to these images, or correct the names");
+    if (absent > 0)
+      project_.warnings.push_back(
+          fmt::format("{}: {} of {} lines are not used, because the block has no such image (the "
+                      "first is '{}')",
+                      first_absent->where, absent, table.rows.size(), first_absent->image));
+  }
+
+  std::vector<ImageTime> times_of(const std::vector<std::size_t>& images) const {
+    std::vector<ImageTime> times;
+    for (const std::size_t i : images) times.push_back(time_of_image(scanned_[i]));
+    return times;
+  }
+
+  void by_exposure(const PositionTable& table, const std::string& file) {
+    const std::vector<std::size_t> images = images_of_source(source_, file, scanned_);
+    const std::vector<std::int64_t> rows = rows_of_images(table, times_of(images), file);
+    for (std::size_t i = 0; i < images.size(); ++i)
+      if (rows[i] >= 0) rows_[images[i]] = table.rows[static_cast<std::size_t>(rows[i])];
+  }
+
+  void by_time(PositionTable& table) {
+    const std::vector<std::size_t> images = images_of_source(source_, source_.path, scanned_);
+    const std::vector<double> times =
+        times_on_path(table, times_of(images), source_.time_offset_s, source_.path, table.notes);
+    const std::vector<PositionTable::Row> places = interpolate(table, times);
+    const bool whole =
+        std::ranges::all_of(times, [](double time) { return std::isnan(time) || time == std::floor(time); });
+    const bool degrees = crs_ == "WGS84" || crs_.starts_with("EPSG:4326");
+    if (whole)
+      table.notes.push_back(
+          source_.path +
+          ": the headers have times in whole seconds only; the sigmas of the positions grow by 0.3 s of "
+          "flight. A file of exposures (_events.pos, _Timestamp.MRK) is better");
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      if (places[i].where.empty()) continue;
+      PositionTable::Row row = places[i];
+      const double smear = whole ? kTimeSigma * speed_at(table, times[i], degrees) : 0;
+      row.sigma_horizontal_m = std::hypot(row.sigma_horizontal_m, smear);
+      rows_[images[i]] = row;
+    }
+  }
+
+  const PositionSource& source_;
+  const std::vector<ScannedImage>& scanned_;
+  Project& project_;
+  std::string crs_;
+  std::vector<std::optional<PositionTable::Row>> rows_;
+};
+
+Eigen::Quaterniond rotation_of_row(const PositionTable::Row& row) {
+  const Eigen::Vector3d a = row.angles_deg * kDegree;
+  switch (row.angles) {
+    case AngleKind::kGimbal:
+      return rotation_from(YawPitchRoll{a[0], a[1], a[2]});
+    case AngleKind::kOmegaPhiKappa:
+      return rotation_from(OmegaPhiKappa{a[0], a[1], a[2]});
+    case AngleKind::kBody:
+      break;
+  }
+  return rotation_from(BodyAttitude{a[0], a[1], a[2]});
+}
+
+// Turns the axes east, north, up at a place into those of the grid.
+Eigen::Quaterniond grid_from_true(const CrsToWgs84& crs, const Geodetic& place) {
+  constexpr double kStepDeg = 1e-4;  // 11 m to the north
+  Geodetic north = place;
+  north.latitude_deg += kStepDeg;
+  const Eigen::Vector3d step = crs.from_wgs84(north) - crs.from_wgs84(place);
+  const double bearing = std::atan2(step.x(), step.y());
+  return Eigen::Quaterniond(Eigen::AngleAxisd(-bearing, Eigen::Vector3d::UnitZ()));
+}
+
+// Writes the rows of one file into the headers.
+class IntoHeaders {
+ public:
+  IntoHeaders(const PositionSource& source, const std::string& crs)
+      : source_(source), name_(fs::path(source.path).filename()) {
+    if (crs == "local") return;
+    try {
+      crs_.emplace(crs);
+    } catch (const InputError& error) {
+      throw InputError(source.path + ": " + error.what());
+    }
+  }
+
+  void operator()(const PositionTable::Row& row, ScannedImage& image) const {
+    ImageHeader& header = image.header;
+    const bool has_angles = row.angles_deg.allFinite();
+    if (!row.place.head<2>().allFinite()) return;
+    if (crs_) {
+      const Geodetic place = position(row);
+      header.position = place;
+      if (has_angles) {
+        Eigen::Quaterniond rotation = rotation_of_row(row);
+        if (row.angles == AngleKind::kOmegaPhiKappa) rotation = (rotation * grid_from_true(*crs_, place)).normalized();
+        header.attitude = {rotation, name_};
+      }
+    } else {
+      image.local_position = row.place;
+      if (std::isnan(row.place.z()))
+        throw InputError(row.where + ": the height is missing; positions in the block's own frame need one");
+      if (has_angles) image.local_attitude = rotation_of_row(row);
+      if (has_angles) header.attitude.reset();
+    }
+    header.position_source = name_;
+    header.fix = ImageHeader::Fix::kUnstated;
+    header.dop = kNoNumber;
+    header.position_sigma_horizontal_m = source_.sigma_horizontal.value_or(row.sigma_horizontal_m);
+    header.position_sigma_vertical_m = source_.sigma_vertical.value_or(row.sigma_vertical_m);
+  }
+
+ private:
+  Geodetic position(const PositionTable::Row& row) const {
+    Eigen::Vector3d place = row.place;
+    const bool flat = std::isnan(place.z());
+    if (flat) place.z() = 0;
+    try {
+      Geodetic result = crs_->to_wgs84(place);
+      if (!row.offset_m.isZero(0)) {
+        const GroundFrame here{true, result.latitude_deg, result.longitude_deg, result.height_m, ""};
+        result = Georeference(here).to_geodetic(row.offset_m);
+      }
+      if (flat) result.height_m = kNoNumber;
+      return result;
+    } catch (const InputError& error) {
+      throw InputError(row.where + ": " + error.what());
+    }
+  }
+
+  const PositionSource& source_;
+  std::string name_;
+  std::optional<CrsToWgs84> crs_;
+};
+
+double flat_distance_m(const Geodetic& a, const Geodetic& b) {
+  constexpr double kMetresPerDegree = 111320;
+  const double east = std::remainder(a.longitude_deg - b.longitude_deg, 360.0) * std::cos(a.latitude_deg * kDegree);
+  return std::hypot(east, a.latitude_deg - b.latitude_deg) * kMetresPerDegree;
+}
+
+}  // namespace
+
+bool read_position_files(YamlReader& top, std::vector<ScannedImage>& scanned, Project& project) {
+  const std::vector<PositionSource> sources = read_sources(top);
+  if (sources.empty()) return false;
+  if (scanned.empty()) refuse_unused(top, "positions", "with 'block', which has its own positions");
+  std::vector<std::string> left_out = project.copies;
+  for (const auto& [name, reason] : project.unreadable) left_out.push_back(name);
+  const ImageLookup lookup(project.block, left_out);
+  // Positions of headers are of another accuracy and often of another height datum, so none of them stays.
+  std::vector<std::optional<Geodetic>> before;
+  for (ScannedImage& image : scanned) {
+    before.push_back(image.header.position);
+    image.header.position.reset();
+  }
+  std::vector<const PositionSource*> source_of(scanned.size(), nullptr);
+  for (const PositionSource& source : sources) {
+    RowsOfImages finder(source, scanned, project);
+    const auto rows = finder.find(lookup);
+    const IntoHeaders write(source, finder.crs());
+    std::vector<double> distances;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      if (!rows[i]) continue;
+      if (source_of[i] != nullptr)
+        throw InputError(source.where + ": image '" + scanned[i].name + "' has a position in '" + source_of[i]->path +
+                         "' and in '" + source.path +
+                         "'; leave out one of the files, or give 'images: FOLDER' for each");
+      source_of[i] = &source;
+      write(*rows[i], scanned[i]);
+      if (before[i] && scanned[i].header.position)
+        distances.push_back(flat_distance_m(*before[i], *scanned[i].header.position));
+    }
+    if (distances.size() > 2 && median(distances) > kFarFromHeader)
+      project.warnings.push_back(
+          fmt::format("{}: its positions lie {:.0f} m (median) from those of the image headers; check that it belongs "
+                      "to these images "
+                      "and is in the coordinate system that it names",
+                      source.path, median(distances)));
+  }
+  const std::int64_t without = std::ranges::count_if(
+      scanned, [](const ScannedImage& image) { return !image.header.position && !image.local_position; });
+  if (without > 0)
+    project.warnings.push_back(
+        fmt::format("{}: {} of {} images have no position in the files of 'positions'; the positions "
+                    "of their headers are not used",
+                    top.where("positions"), without, scanned.size()));
+  return true;
+}
+
+}  // namespace megablock

@@ -1,0 +1,74 @@
+#!/usr/bin/env python3
+"""Runs the program with blocks as people have them: what is harmless must do no harm, and what is missing is said.
+
+usage: everyday_input.py MEGABLOCK [unittest arguments]
+Each case is one of shared/data/hard, made from a small rendered block.
+"""
+import json
+import unittest
+
+import pictures
+from program import megablock, status
+from small_block import CopyOfTheBlock, setUpModule, simulate, tearDownModule, work
+
+OPTIONS = "features:\n  max_features: 1200\n  max_megapixels: 2\n"
+
+
+class EverydayInput(CopyOfTheBlock):
+    def files(self):
+        return sorted(self.images.glob("*.jpg"))
+
+    def write_project(self, text):
+        self.project.write_text(f"images: images\n{text}{OPTIONS}")
+
+    def assert_all_oriented(self, images=12):
+        state = status(self.job)
+        self.assertEqual((state["images"], state["oriented"]), (images, images))
+
+    def test_leftovers_of_systems_are_no_images(self):
+        for file in self.files()[:3]:
+            (self.images / f"._{file.name}").write_bytes(b"\0\5\x16\7\0\2\0\0Mac OS X        " + bytes(4000))
+            (self.images / f"{file.name}_original").write_bytes(file.read_bytes())
+        (self.images / "Thumbs.db").write_bytes(bytes(600))
+        self.run_job()
+        self.assert_all_oriented()
+
+    def test_one_position_for_all_images_is_used_once(self):
+        for file in self.files():
+            pictures.Exif(file).set_position(48.85, 2.35)
+        self.write_project("")
+        self.assertIn("12 of 12 images share one position (48.850000, 2.350000)", self.run_job())
+        self.assert_all_oriented()
+
+    def test_a_control_point_in_an_absent_image_is_a_warning(self):
+        simulate("controlled", 12, 480, 360, "--control-points", 4)
+        self.folder = work / "controlled"
+        self.project, self.images, self.job = self.folder / "block.yaml", self.folder / "images", self.folder / "job"
+        control = self.folder / "gcp_list.txt"
+        rows = control.read_text().splitlines()
+        absent = rows[1].split()
+        absent[5] = "IMG_9999.jpg"
+        # As a spreadsheet would write it: byte order mark, semicolons, line ends of Windows, names in other case.
+        lines = [rows[0]] + [";".join(row.split()).upper() for row in rows[1:]] + [";".join(absent)]
+        control.write_bytes(b"\xef\xbb\xbf" + "\r\n".join(lines).encode())
+        self.write_project("control: gcp_list.txt\n")
+        said = self.run_job()
+        self.assertIn("1 measurement is not used, because the block has no image 'IMG_9999.jpg'", said)
+        self.assert_all_oriented()
+
+    def test_positions_of_a_file_do_as_those_of_the_headers(self):
+        lines = ["EPSG:4326"]
+        for file in self.files():
+            latitude, longitude = pictures.Exif(file).position()
+            lines.append(f"{file.stem} {longitude:.9f} {latitude:.9f} {pictures.Exif(file).height()} 0 0 0 0.05 0.05")
+            pictures.strip_exif(file)
+        (self.folder / "geo.txt").write_text("\n".join(lines))
+        self.write_project("positions: geo.txt\ncameras: {default: {focal_px: 375}}\norigin: [48.85, 2.35, 100]\n")
+        self.run_job()
+        self.assert_all_oriented()
+        errors = json.loads(megablock("evaluate", self.job, self.folder / "truth.csv", "--json"))
+        self.assertLess(errors["position_max_m"], 0.5)
+
+
+if __name__ == "__main__":
+    unittest.main()
