@@ -125,17 +125,22 @@ std::vector<std::size_t> images_of_source(const PositionSource& source, const st
   return source.folder.empty() && !beside.empty() ? beside : images;
 }
 
-// Metres per second along the path at a time, from the positions half a second before and after.
-double speed_at(const PositionTable& path, double time, bool degrees) {
-  const std::vector<PositionTable::Row> rows = interpolate(path, {time - 0.5, time + 0.5});
-  if (rows[0].where.empty() || rows[1].where.empty()) return 0;
-  Eigen::Vector3d step = rows[1].place - rows[0].place;
+// Metres per second along the path at each time, from the positions half a second before and after; 0 off the path.
+std::vector<double> speeds_at(const PositionTable& path, const std::vector<double>& times, bool degrees) {
+  std::vector<double> before = times, after = times, speeds;
+  for (double& time : before) time -= 0.5;
+  for (double& time : after) time += 0.5;
+  const std::vector<PositionTable::Row> from = interpolate(path, before), to = interpolate(path, after);
   constexpr double kMetresPerDegree = 111320;  // along meridians and along the equator, to one per cent
-  if (degrees) {
-    step.x() *= kMetresPerDegree * std::cos(rows[0].place.y() * kDegree);
-    step.y() *= kMetresPerDegree;
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    Eigen::Vector3d step = to[i].place - from[i].place;
+    if (degrees) {
+      step.x() *= kMetresPerDegree * std::cos(from[i].place.y() * kDegree);
+      step.y() *= kMetresPerDegree;
+    }
+    speeds.push_back(step.allFinite() ? step.norm() : 0);
   }
-  return step.norm();
+  return speeds;
 }
 
 // Gives every row its image.
@@ -178,7 +183,7 @@ class RowsOfImages {
     std::size_t absent = 0, used = 0;
     const PositionTable::Row* first_absent = nullptr;
     for (const PositionTable::Row& row : table.rows) {
-      const ImageLookup::Found found = lookup.find(row.image);
+      const ImageLookup::Found found = find_image(row.image, lookup);
       if (found.kind == ImageLookup::Kind::kAmbiguous)
         throw InputError(row.where + ": several images of the block have the name '" + row.image +
                          "'; write it with its folder");
@@ -201,6 +206,15 @@ class RowsOfImages {
           fmt::format("{}: {} of {} lines are not used, because the block has no such image (the "
                       "first is '{}')",
                       first_absent->where, absent, table.rows.size(), first_absent->image));
+  }
+
+  // A name means the image of the folder that the project names, else of the file's own folder, else of any.
+  ImageLookup::Found find_image(const std::string& name, const ImageLookup& lookup) const {
+    std::string folder = source_.folder;
+    if (folder.empty())
+      folder = fs::path(source_.path).parent_path().lexically_relative(project_.block.image_folder).generic_string();
+    const ImageLookup::Found inside = lookup.find(folder + "/" + name);
+    return inside.kind == ImageLookup::Kind::kImage ? inside : lookup.find(name);
   }
 
   std::vector<ImageTime> times_of(const std::vector<std::size_t>& images) const {
@@ -229,11 +243,11 @@ class RowsOfImages {
           source_.path +
           ": the headers have times in whole seconds only; the sigmas of the positions grow by 0.3 s of "
           "flight. A file of exposures (_events.pos, _Timestamp.MRK) is better");
+    const std::vector<double> speeds = speeds_at(table, times, degrees);
     for (std::size_t i = 0; i < images.size(); ++i) {
       if (places[i].where.empty()) continue;
       PositionTable::Row row = places[i];
-      const double smear = whole ? kTimeSigma * speed_at(table, times[i], degrees) : 0;
-      row.sigma_horizontal_m = std::hypot(row.sigma_horizontal_m, smear);
+      if (whole) row.sigma_horizontal_m = std::hypot(row.sigma_horizontal_m, kTimeSigma * speeds[i]);
       rows_[images[i]] = row;
     }
   }

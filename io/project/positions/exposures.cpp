@@ -6,7 +6,6 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <set>
 
 #include "geometry/numbers/median.h"
 #include "io/base/error.h"
@@ -42,10 +41,12 @@ std::vector<std::int64_t> rows_by_number(const PositionTable& table, const std::
     if (table.rows[r].number < 0 || !row_of.emplace(table.rows[r].number, static_cast<std::int64_t>(r)).second)
       return {};
   std::vector<std::int64_t> rows;
-  std::set<std::int64_t> seen;
+  std::map<std::int64_t, double> clock_of;  // of the first image with a number
   for (const ImageTime& image : images) {
     const auto found = row_of.find(exposure_number(image.name));
-    if (found == row_of.end() || !seen.insert(found->second).second) return {};
+    if (found == row_of.end()) return {};
+    const auto [first, inserted] = clock_of.emplace(found->second, image.clock_s);
+    if (!inserted && !(std::abs(first->second - image.clock_s) <= kSameTime)) return {};
     rows.push_back(found->second);
   }
   return rows;

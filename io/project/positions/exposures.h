@@ -2,7 +2,8 @@
 //
 // An exposure belongs to the image
 //     1. whose name ends in its number ("100_0001_0023.JPG", "DJI_20210601102030_0023_W.JPG"), if all images of the
-//        folder have such numbers, each once, and the file has all of them;
+//        folder have such numbers, the file has all of them, and images of one number (of several cameras) have one
+//        time;
 //     2. of the same rank in the order of time (of name, where headers have no times), if there are as many exposures;
 //     3. taken at its time. The clock of a camera has an unknown offset from GPS time; the one counts with which most
 //        exposures fall on images, if no other does nearly as well.

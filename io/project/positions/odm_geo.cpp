@@ -36,7 +36,11 @@ GeoFields geo_fields(const std::string& line) {
   return {split_fields(line, Separator::kBlanks), Separator::kBlanks};
 }
 
-bool is_geo_row(const GeoFields& fields) { return fields.text.size() > 2 && !is_number(fields.text[0]); }
+// Names of images may be numbers. A line of a list of control points then has a name in its sixth field.
+bool is_geo_row(const GeoFields& fields) {
+  const std::vector<std::string>& text = fields.text;
+  return text.size() > 2 && (!is_number(text[0]) || text.size() < 6 || is_number(text[5]));
+}
 
 // The lines that are not comments.
 std::vector<TextLine> geo_lines(const PositionText& text) {

@@ -168,6 +168,21 @@ TEST_F(ProjectPositions, OfSeveralFilesAreSeveralFlights) {
               HasSubstr("block.yaml:2: image '100_0001_0001.JPG' has a position in 'a.txt' and in 'c.txt'"));
 }
 
+TEST_F(ProjectPositions, OfEqualNamesBelongToTheFolderOfTheirFile) {
+  write_image_file(folder_.path("images/b/100_0001_0001.JPG"), 64, 48, 9);
+  write_image_file(folder_.path("images/c/100_0001_0001.JPG"), 64, 48, 10);
+  write_file(folder_.path("images/b/geo.txt"), "EPSG:4326\n100_0001_0001 -91.99 46.84 250 0 0 0 0.1 0.1\n");
+  write_file(folder_.path("c.txt"), "EPSG:4326\n100_0001_0001 -91.98 46.84 250 0 0 0 0.2 0.2\n");
+  const Project project = read("d.txt", "x", "positions: [images/b/geo.txt, {file: c.txt, images: c}]\n");
+  EXPECT_FALSE(project.block.frames[FrameIndex(0)].position_prior);
+  EXPECT_EQ(prior(project, 4).sigma.z(), 0.1);
+  EXPECT_EQ(prior(project, 5).sigma.z(), 0.2);
+  write_image_file(folder_.path("images/b/2.JPG"), 64, 48, 11);
+  write_image_file(folder_.path("images/c/2.JPG"), 64, 48, 12);
+  EXPECT_THAT(refusal("c.txt", "EPSG:4326\n2 -91.98 46.84 250\n"),
+              HasSubstr("c.txt:2: several images of the block have the name '2'; write it with its folder"));
+}
+
 TEST_F(ProjectPositions, CarryAttitudes) {
   // Pix4D: 90, 0, 0 is nadir with the top of the image to the east.
   const Project project =

@@ -44,6 +44,14 @@ TEST(Exposures, BelongToImagesByTheirNumbers) {
   EXPECT_THAT(rows_of_images(exposures_at(kExposureTimes), images, "f.MRK"), ElementsAre(2, 0, 9));
 }
 
+TEST(Exposures, BelongToAllCamerasOfADrone) {
+  const std::vector<ImageTime> images = {{"DJI_0001_W.JPG", kNoNumber, 100},
+                                         {"DJI_0001_T.JPG", kNoNumber, 101},
+                                         {"DJI_0002_W.JPG", kNoNumber, 102},
+                                         {"DJI_0002_T.JPG", kNoNumber, 102}};
+  EXPECT_THAT(rows_of_images(exposures_at({0, 2.1, 4}), images, "f.MRK"), ElementsAre(0, 0, 1, 1));
+}
+
 TEST(Exposures, BelongToImagesByTheirOrder) {
   std::vector<ImageTime> images;
   for (std::size_t i = 0; i < kExposureTimes.size(); ++i)  // an unknown clock, in whole seconds; names that begin anew
