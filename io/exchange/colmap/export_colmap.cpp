@@ -60,8 +60,7 @@ void write_model(const BlockResult& result, Writer& writer) {
                  end - begin);
     for (std::int64_t k = begin; k < end; ++k) {
       const auto position = static_cast<std::size_t>(by_image.observation[static_cast<std::size_t>(k)]);
-      writer.observation(without_skew(view.intrinsics(i), view.pixel(view.observations[position])),
-                         point_id(view, track[position]), k == begin);
+      writer.observation(view.pixel(view.observations[position]), point_id(view, track[position]), k == begin);
     }
     writer.end_image();
   }
