@@ -12,8 +12,7 @@
 //     phi = -A^+ a s                                                       turned
 //     information about s = n_ss - n_st N_tt^+ n_ts - a'A^+ a              scale_information
 //
-// Rotations and the scale have natural units, and their information is compared with fixed limits: a rotation is
-// determined by a sigma below 0.2 rad, a scale by one below a factor (kTurnDetermined, kScaleDetermined). Shifts have
+// Rotations and the scale have natural units, and their information is compared with one (kDetermined). Shifts have
 // none; they are free in the null space alone, which is a share of the largest eigenvalue. Pseudo-inverses leave out
 // the eigenvectors that are free.
 #include "merge/datum/gauge.h"
@@ -35,11 +34,7 @@ using Vector7 = Eigen::Matrix<double, 7, 1>;
 constexpr double kNullDirection = 1e-11;  // share of the largest eigenvalue; the matrix itself has errors of 1e-15
 constexpr double kHeldDirection = 1e-6;   // share of the largest singular value: a frame holds the directions above it
 constexpr double kOnePlace = 1e-9;  // share of the coordinates: frames within a smaller extent are all at one place
-// Information of a rotation (1 / rad^2) and of a scale, below which they are free. A rotation by phi moves positions at
-// the distance L by phi^2 L / 2 off their tangents: at 0.2 rad this is 1 m for a block of 100 m. With a larger sigma
-// the linearised system says nothing of the rotation, and its steps do not end: positions without heights, for example,
-// leave the tilt of a level block to the curvature of the cosine.
-constexpr double kTurnDetermined = 25, kScaleDetermined = 1;
+constexpr double kDetermined = 1;   // information of a rotation (1 / rad^2) or of a scale, below which it is free
 
 // All parts of one component.
 struct PartGroup {
@@ -70,8 +65,8 @@ struct Freedom {
   bool against_priors = false;  // a free rotation has some information
 };
 
-// Shifts are free in the null space. Rotations are free where their information is less than kTurnDetermined, with the
-// shifts estimated along with them.
+// Shifts are free in the null space. Rotations are free where their information is less than 1 / rad^2, with the shifts
+// estimated along with them.
 Freedom freedom_of(const Matrix77& normal) {
   Freedom freedom;
   freedom.limit = kNullDirection * symmetric_eigen(normal).values(6);
@@ -94,11 +89,12 @@ Freedom freedom_of(const Matrix77& normal) {
   std::int64_t free_turns = 0;
   Eigen::Vector3d turned = Eigen::Vector3d::Zero();  // the rotation that follows from a scale of one
   for (int i = 0; i < 3; ++i) {
-    if (turn.values(i) <= std::max(freedom.limit, kTurnDetermined)) {
+    if (turn.values(i) <= std::max(freedom.limit, kDetermined)) {
       ++free_turns;
       freedom.against_priors |= turn.values(i) > freedom.limit;
-    } else
+    } else {
       turned -= turn.vectors.col(i) * turn.vectors.col(i).dot(both) / turn.values(i);
+    }
   }
   // A free rotation takes along the shift that follows from it.
   freedom.directions = Eigen::MatrixXd::Zero(7, free_shifts + free_turns);
@@ -177,7 +173,7 @@ std::vector<std::size_t> scale_groups(const std::vector<PartGroup>& components) 
 void number_columns(const std::vector<std::size_t>& scale_group, const std::vector<Freedom>& freedoms,
                     std::vector<BlockComponent>& components) {
   struct Scale {
-    double information = 0, limit = kScaleDetermined;
+    double information = 0, limit = kDetermined;
     std::int64_t component = -1, column = -1;
     bool free() const { return component >= 0 && information <= limit; }
   };

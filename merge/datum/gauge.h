@@ -4,7 +4,7 @@
 // similarity_information.h says how a similarity moves the unknowns (the matrix N) and what the observations tell of
 // it, by the 7 x 7 matrix sum (J N)'(J N) of their residuals. Its null space is free: 7 directions for single cameras
 // without priors, 6 with held rigs, 1 for positions on one straight line, 4 with attitudes only. A rotation also counts
-// as free when the priors give it no better than to 0.2 radians, and a scale when they give it no better than to a
+// as free when the priors give it no better than to a radian, and a scale when they give it no better than to a
 // factor (positions that are within their own noise of a straight line): the linearised system says nothing of such
 // directions.
 //
@@ -23,7 +23,7 @@
 //
 // whatever the weight. The constraints thus move no adjusted observation and leave the decrement unchanged. They couple
 // no unknowns, make no dense rows and add nothing to the gradient. A rotation that priors give, but no better than to
-// 0.2 radians, is held in the same way, although for it neither H N nor the gradient N'b is quite zero. There the
+// a radian, is held in the same way, although for it neither H N nor the gradient N'b is quite zero. There the
 // weight is kFirmly: the constraint must bear the pull of the priors, which would otherwise stay in the decrement (b'x
 // along N is (N'b)^2 over the weight) and keep the iterations from their end.
 #pragma once
@@ -62,8 +62,8 @@ struct TileGauge {
 // Needs all tables of the tile, also those that may lie in scratch (tile_store.h).
 TileGauge tile_gauge(const TileProblem& problem, const TilePlan& plan, const TileState& state);
 
-// The weight of constraints that hold a rotation against priors. The other directions of the frame lose six digits.
-inline constexpr double kFirmly = 1e6;
+// The weight of constraints that hold a rotation against priors. The other directions of the frame lose eight digits.
+inline constexpr double kFirmly = 1e8;
 
 // A connected component of the block.
 struct BlockComponent {
