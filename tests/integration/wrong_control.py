@@ -2,7 +2,8 @@
 """Tests that one gross error among the control points is named and moves nothing. usage: wrong_control.py MEGABLOCK
 
 A simulated block without positions hangs on six control points. Each point in turn gets a coordinate that is 10 m off,
-or a mark that is 100 px off. The poses must stay within one sigma of those that the block has without the error.
+or a mark that is 100 px off. The poses must stay within one sigma of those that the block has without the wrong
+coordinates (the point is a check point there), or without the wrong mark.
 """
 import csv
 import pathlib
@@ -14,6 +15,7 @@ import h5py
 
 from program import megablock, status
 
+CHECK_POINT = 2  # role in given.h5
 COORDINATES = ("x_m", "y_m", "z_m")
 
 
@@ -41,18 +43,21 @@ class WrongControl(unittest.TestCase):
     def tearDownClass(cls):
         shutil.rmtree(cls.work)
 
-    def spoil(self, name, change):
-        """Runs a copy of the block after change(given.h5), and returns the remarks."""
+    def run_changed(self, name, change):
+        """Runs a copy of the block after change(given.h5)."""
         folder = self.work / name
         shutil.copytree(self.block, folder)
         with h5py.File(folder / "given.h5", "r+") as given:
             change(given)
-        wrong, poses = run(folder / "block.yaml", folder / "job")
-        self.assertEqual(poses.keys(), self.poses.keys())
+        return run(folder / "block.yaml", folder / "job")
+
+    def spoil(self, name, change, right):
+        """Runs the block with an error, compares its poses with those of `right`, and returns the remarks."""
+        wrong, poses = self.run_changed(name, change)
+        self.assertEqual(poses.keys(), right.keys())
         for image, row in poses.items():
-            before = self.poses[image]
+            before = right[image]
             for axis in COORDINATES:
-                # Without the point the block is less certain, which its own sigmas say.
                 moved = abs(float(row[axis]) - float(before[axis])) / float(row["sigma_" + axis])
                 self.assertLess(moved, 1, f"{name}: {image} moves by {moved:.2f} sigmas along {axis}")
         return "\n".join(wrong["remarks"])
@@ -64,7 +69,11 @@ class WrongControl(unittest.TestCase):
         for point, name in enumerate(self.names):
             def change(given, point=point):
                 given["control/position"][point, point % 3] += 10
-            said = self.spoil(f"coordinate-{point}", change)
+
+            def check(given, point=point):
+                given["control/role"][point] = CHECK_POINT
+            _, right = self.run_changed(f"check-{point}", check)
+            said = self.spoil(f"coordinate-{point}", change, right)
             self.assertRegex(said, rf"1 of 6 control points differs.*: {name} by (9\.[5-9]|10\.[0-5])\d* m")
 
     def test_a_mark_is_named_and_moves_nothing(self):
@@ -74,7 +83,7 @@ class WrongControl(unittest.TestCase):
             first += self.counts[point]
             def change(given, row=row):
                 given["control/measurement/pixel"][row, row % 2] += 100
-            said = self.spoil(f"mark-{point}", change)
+            said = self.spoil(f"mark-{point}", change, self.poses)
             self.assertRegex(said, rf"1 mark of control and check points is rejected: {name} in \S+ by (9\d|10\d)")
 
 

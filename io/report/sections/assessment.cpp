@@ -119,6 +119,8 @@ std::string unused_points_item(const BlockResult& result) {
     const std::string text = unused_points_text(result, role);
     if (!text.empty()) list += item("bad", escape(text) + ": see <a href=\"#control\">control and check points</a>.");
   }
+  for (const std::string& text : wrong_control_texts(result))
+    list += item("look", escape(text) + ": see <a href=\"#control\">control and check points</a>.");
   return list;
 }
 

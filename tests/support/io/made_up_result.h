@@ -79,7 +79,8 @@ inline BlockResult made_up_result(const SimulationOptions& options, std::int64_t
     result.frame_covariance.push_back(c);
   }
   for (std::size_t c = 0; c < result.block.cameras.size(); ++c) {
-    Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(8, 8) * 1e-10;
+    const int parameters = result.block.cameras[CameraIndex(static_cast<std::int64_t>(c))].intrinsics.size();
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(parameters, parameters) * 1e-10;
     covariance.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() * 0.04;
     covariance(3, 4) = covariance(4, 3) = -0.9e-10;
     result.camera_covariance.push_back(covariance);
