@@ -62,7 +62,6 @@ struct Freedom {
   double scale_information = 0;
   double limit = 0;  // below, the information of a direction is rounding
   bool has_scale = false;
-  bool against_priors = false;  // a free rotation has some information
 };
 
 // Shifts are free in the null space. Rotations are free where their information is less than 1 / rad^2, with the shifts
@@ -89,12 +88,10 @@ Freedom freedom_of(const Matrix77& normal) {
   std::int64_t free_turns = 0;
   Eigen::Vector3d turned = Eigen::Vector3d::Zero();  // the rotation that follows from a scale of one
   for (int i = 0; i < 3; ++i) {
-    if (turn.values(i) <= std::max(freedom.limit, kDetermined)) {
+    if (turn.values(i) <= std::max(freedom.limit, kDetermined))
       ++free_turns;
-      freedom.against_priors |= turn.values(i) > freedom.limit;
-    } else {
+    else
       turned -= turn.vectors.col(i) * turn.vectors.col(i).dot(both) / turn.values(i);
-    }
   }
   // A free rotation takes along the shift that follows from it.
   freedom.directions = Eigen::MatrixXd::Zero(7, free_shifts + free_turns);
@@ -144,7 +141,6 @@ BlockComponent component_of(const PartGroup& group, Freedom& freedom) {
   // The held positions give sum L^2 I as the block of t and sum L (X - c) as the column of t and s.
   if (held(3, 3) > 0) c.pivot += c.extent * held.block<3, 1>(3, 6) / held(3, 3);
   freedom = freedom_of(normal);
-  c.against_priors = freedom.against_priors;
   // A scale moves no frame where all frames are at one place: a single frame that is known by its position only, for
   // example.
   freedom.has_scale = !one_place;
@@ -225,7 +221,6 @@ void hold_frames(const PartGroup& group, const BlockComponent& c, std::vector<Ga
     if (rank > 0 && largest > 0) {
       GaugeConstraint constraint;
       constraint.frame = frame;
-      if (c.against_priors) constraint.weight = kFirmly;
       constraint.count = rank;
       constraint.directions.leftCols(rank) = moves * svd.v.leftCols(rank);
       constraints.push_back(constraint);
@@ -331,7 +326,7 @@ TileDatum tile_datum(const BlockGauge& gauge, std::int64_t tile, const TileProbl
   if (!gauge.free()) return datum;
   for (const GaugeConstraint& c : gauge.constraints) {
     const UnknownId id{UnknownKind::kFrame, 0, c.frame};
-    if (find_unknown(plan.owned, id) >= 0) datum.holds.push_back({id, c.directions.leftCols(c.count), c.weight});
+    if (find_unknown(plan.owned, id) >= 0) datum.holds.push_back({id, c.directions.leftCols(c.count)});
   }
   if (!with_columns) return datum;
   const auto components = free_component_of_frame(gauge, tile, plan);

@@ -4,8 +4,8 @@
 // similarity_information.h says how a similarity moves the unknowns (the matrix N) and what the observations tell of
 // it, by the 7 x 7 matrix sum (J N)'(J N) of their residuals. Its null space is free: 7 directions for single cameras
 // without priors, 6 with held rigs, 1 for positions on one straight line, 4 with attitudes only. A rotation also counts
-// as free when the priors give it no better than to a radian, and a scale when they give it no better than to a
-// factor (positions that are within their own noise of a straight line): the linearised system says nothing of such
+// as free when the priors give it no better than to a radian, and a scale when they give it no better than to a factor
+// (positions that are within their own noise of a straight line): the linearised system says nothing of such
 // directions.
 //
 // The free directions belong to a connected component of the block, and are found before every sweep up. Pivots that
@@ -22,10 +22,8 @@
 //     (H + B'B)^-1 b is a solution x of H x = b with B x = 0,    b'(H + B'B)^-1 b = b'x,
 //
 // whatever the weight. The constraints thus move no adjusted observation and leave the decrement unchanged. They couple
-// no unknowns, make no dense rows and add nothing to the gradient. A rotation that priors give, but no better than to
-// a radian, is held in the same way, although for it neither H N nor the gradient N'b is quite zero. There the
-// weight is kFirmly: the constraint must bear the pull of the priors, which would otherwise stay in the decrement (b'x
-// along N is (N'b)^2 over the weight) and keep the iterations from their end.
+// no unknowns, make no dense rows and add nothing to the gradient. A rotation that priors give, but no better than to a
+// radian, is held in the same way, although for it H N is not quite zero.
 #pragma once
 
 #include <Eigen/Core>
@@ -62,9 +60,6 @@ struct TileGauge {
 // Needs all tables of the tile, also those that may lie in scratch (tile_store.h).
 TileGauge tile_gauge(const TileProblem& problem, const TilePlan& plan, const TileState& state);
 
-// The weight of constraints that hold a rotation against priors. The other directions of the frame lose eight digits.
-inline constexpr double kFirmly = 1e8;
-
 // A connected component of the block.
 struct BlockComponent {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -75,8 +70,7 @@ struct BlockComponent {
   // common scale last.
   std::vector<std::int64_t> columns;
   Matrix77 directions = Matrix77::Zero();  // first of its columns: the free combinations of (phi, t, s)
-  std::int64_t defect = 0;      // its share of the block's defect: a common scale counts in one component only
-  bool against_priors = false;  // a free rotation is held that priors determine, but hardly
+  std::int64_t defect = 0;  // its share of the block's defect: a common scale counts in one component only
   // The projection on the combinations that move no held position. A step may move the component along them as a whole
   // (block_motion.h).
   Matrix77 movable = Matrix77::Identity();
@@ -96,7 +90,6 @@ struct BlockComponent {
 struct GaugeConstraint {
   std::int64_t frame = -1;
   std::int64_t count = 0;
-  double weight = 1;
   Matrix67 directions = Matrix67::Zero();
 };
 

@@ -47,7 +47,6 @@ struct TileDatum {
   struct Hold {
     UnknownId frame;
     Eigen::Matrix<double, 6, Eigen::Dynamic> directions;  // along which the frame is held
-    double weight = 1;                                    // of the constraints (gauge.h)
   };
   std::vector<Hold> holds;
   Step columns{{}, 0, {}};  // further right-hand sides
