@@ -119,6 +119,8 @@ void read_values(YamlReader& reader, bool image_files, Camera& camera) {
 // Holds the parameters that `calibrate` does not free.
 void read_calibrate(YamlReader& reader, Camera& camera) {
   const auto calibrate = reader.node("calibrate");
+  camera.choose = calibrate->IsScalar() && calibrate->Scalar() == "auto";
+  if (camera.choose) return;
   if (calibrate->IsSequence())
     hold_except(*calibrate, reader.where("calibrate"), camera);
   else if (!*reader.flag("calibrate"))

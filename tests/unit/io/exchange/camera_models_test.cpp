@@ -63,6 +63,18 @@ TEST(CameraModelFiles, WithoutRareParametersAreRead) {
   EXPECT_EQ(covariance(8, 8), 0);
 }
 
+TEST(CameraModelFiles, KeepTheChoiceOfParameters) {
+  ScratchDirectory folder;
+  Block block = every_camera();
+  block.cameras[CameraIndex(1)].choose = true;
+  block.cameras[CameraIndex(1)].choice = "estimated: f";
+  write_block(folder.path("block.h5"), block);
+  const Block back = read_block(folder.path("block.h5"));
+  EXPECT_TRUE(back.cameras[CameraIndex(1)].choose);
+  EXPECT_EQ(back.cameras[CameraIndex(1)].choice, "estimated: f");
+  EXPECT_FALSE(back.cameras[CameraIndex(0)].choose);
+}
+
 TEST(CameraModelFiles, KeepEveryModel) {
   ScratchDirectory folder;
   const Block block = every_camera();
@@ -113,6 +125,14 @@ TEST_F(CameraModelProject, TakesModelAndParameters) {
   expected[kSymmetryX] = 96;
   expected[kRadialTerms] = 0.2 / (1400.0 * 1400.0);
   for (std::size_t p = 0; p < expected.size(); ++p) EXPECT_DOUBLE_EQ(camera.prior_sigma[p], expected[p]);
+}
+
+TEST_F(CameraModelProject, ChoosesParametersWhenAsked) {
+  EXPECT_FALSE(read("    focal_px: 1400\n").choose);
+  EXPECT_TRUE(read("    calibrate: auto\n").choose);
+  for (const char* told : {"true", "false", "[focal]"})
+    EXPECT_FALSE(read(std::string("    calibrate: ") + told + "\n").choose) << told;
+  EXPECT_THAT(refusal("    calibrate: maybe\n"), HasSubstr("block.yaml:4"));
 }
 
 TEST_F(CameraModelProject, EstimatesAffinityWhenAsked) {
