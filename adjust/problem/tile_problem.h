@@ -181,6 +181,9 @@ struct TileState {
   std::vector<Eigen::Vector3d> points;
 };
 
+// The part of a block's observations that an adjustment takes, for a split test (half.h).
+enum class Half : std::int32_t { kNone = 0, kTiePoints1 = 1, kTiePoints2 = 2, kImages1 = 3, kImages2 = 4 };
+
 // A loss acts on the length of a residual of n numbers. Of good observations, the share beyond 3 sigmas is 0.3 % for
 // one number (lines), 1.1 % for two (images, verticals) and 2.9 % for three (positions, attitudes). With the corner at
 // three sigmas, nearly all good observations therefore keep the weight 1. docs/developer/decisions.md tells why
@@ -195,7 +198,8 @@ struct ObservationOptions {
   RobustLoss vertical_loss{RobustLoss::Kind::kCauchy, 3.0};
   bool use_position_priors = true;
   bool use_attitude_priors = true;
-  void check() const;  // throws InputError
+  Half half = Half::kNone;  // no option of the project file
+  void check() const;       // throws InputError
 };
 
 // The tile that owns a track, a relative pose or a line (owner.h; docs/developer/decisions.md, "Whose a point is"). A

@@ -118,6 +118,7 @@ void describe(OptionVisitor& visit, MergeSettings& o) {
   visit.integer("screening_rounds", o.screening_rounds);
   visit.flag("estimate_sigmas", o.estimate_sigmas);
   visit.flag("scale_sigma", o.scale_sigma);
+  visit.flag("empirical_sigmas", o.empirical_sigmas);
 }
 
 // The section that sets these members.
@@ -270,7 +271,10 @@ void add_to_hash(Hasher& hasher, const OrientationOptions& options) {
   hash_options(hasher, options.observations);
 }
 void add_to_hash(Hasher& hasher, const EnvironmentOptions& options) { hash_options(hasher, options); }
-void add_to_hash(Hasher& hasher, const AdjustOptions& options) { hash_options(hasher, options); }
+void add_to_hash(Hasher& hasher, const AdjustOptions& options) {
+  hash_options(hasher, options);
+  if (options.observations.half != Half::kNone) hasher.add(options.observations.half);
+}
 void add_to_hash(Hasher& hasher, const MergeSettings& options) { hash_options(hasher, options); }
 
 }  // namespace megablock

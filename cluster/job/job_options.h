@@ -32,6 +32,8 @@ struct MergeSettings {
   // in at most ten adjustments.
   bool estimate_sigmas = false;
   bool scale_sigma = false;  // posterior sigmas multiplied by the a-posteriori sigma
+  // Also computes the empirical sigmas (merge/tile/cluster_scores.h), in one further sweep up and down.
+  bool empirical_sigmas = true;
   void check() const;        // throws InputError
 };
 

@@ -10,10 +10,10 @@
 #include <numbers>
 #include <unordered_map>
 
-#include "geometry/similarity/similarity.h"
 #include "io/base/error.h"
 #include "io/block/crs.h"
 #include "io/block/held_priors.h"
+#include "io/evaluation/free_datum.h"
 #include "io/result/result_option.h"
 #include "io/store/units/state_file.h"
 
@@ -98,18 +98,38 @@ bool is_free(const BlockResult& result) {
   return true;
 }
 
-Similarity align(const BlockResult& result, const std::vector<Match>& matches) {
-  std::vector<Eigen::Vector3d> from, to;
+// The similarity that stands for a free datum, and the covariances of the matched frames after it.
+struct Aligned {
+  Similarity similarity;
+  DatumCovariances covariances, empirical;
+};
+
+std::vector<FrameIndex> frames_of(const std::vector<Match>& matches) {
+  std::vector<FrameIndex> frames;
+  for (const Match& m : matches) frames.push_back(m.frame);
+  return frames;
+}
+
+Aligned as_it_is(const BlockResult& result, const std::vector<Match>& matches) {
+  const std::vector<FrameIndex> frames = frames_of(matches);
+  return {Similarity(), stated_covariances(result, frames), stated_covariances(result, frames, SigmaKind::kEmpirical)};
+}
+
+Aligned align(const BlockResult& result, const std::vector<Match>& matches) {
+  std::vector<Pose> from, to;
+  const std::vector<FrameIndex> frames = frames_of(matches);
   for (const Match& m : matches) {
-    from.push_back(result.state.frames[m.frame].centre);
-    to.push_back(m.truth.centre);
+    from.push_back(result.state.frames[m.frame]);
+    to.push_back(m.truth);
   }
-  const auto similarity = matches.size() >= 3 ? fit_similarity(from, to) : std::nullopt;
+  const DatumFit fit = matches.size() < 3 || determine_similarity(from) ? DatumFit::kPositions : DatumFit::kPoses;
+  const auto similarity = fit_datum(from, to, fit);
   if (!similarity)
     throw InputError(
         "the datum of the result is free, and fewer than three of its frames at different places have a true pose; "
         "give a truth with at least three");
-  return *similarity;
+  return {*similarity, covariances_after_fit(result, frames, fit),
+          covariances_after_fit(result, frames, fit, SigmaKind::kEmpirical)};
 }
 
 // The truth in the ground frame of the result, if both frames are known; otherwise the truth as it is.
@@ -132,10 +152,14 @@ PoseTable in_ground_of(const GroundFrame& ground, const PoseTable& truth) {
   return moved;
 }
 
-void evaluate_frames(const BlockResult& result, const std::vector<Match>& matches, const Similarity& similarity,
-                     double variance_factor, Evaluation& evaluation) {
+void evaluate_frames(const BlockResult& result, const std::vector<Match>& matches, const Aligned& aligned,
+                     double variance_factor, const EvaluateOptions& options, Evaluation& evaluation) {
+  const Similarity& similarity = aligned.similarity;
+  const double truth_angle = options.truth_rotation_sigma_deg * std::numbers::pi / 180;
+  const Eigen::Matrix3d truth_position = std::pow(options.truth_position_sigma_m, 2) * Eigen::Matrix3d::Identity(),
+                        truth_rotation = truth_angle * truth_angle * Eigen::Matrix3d::Identity();
   RootMeanSquare position, rotation, relative;
-  NormalisedError normalised_position, normalised_rotation;
+  NormalisedError normalised_position, normalised_rotation, empirical_position, empirical_rotation;
   std::array<NormalisedError, 2> position_by_place, rotation_by_place;  // interior, boundary
   double largest = 0;
   const bool positions_used = option_of(result, "adjustment.use_position_priors") != "false",
@@ -160,31 +184,42 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
         frames[matches[i - 1].frame].pass == frames[m.frame].pass)
       relative.add((error - previous_error).squaredNorm());
     previous_error = error;
-    if (result.frame_covariance.empty()) continue;
+    if (aligned.covariances.frames.empty()) continue;
     // Order of the increment: rotation, centre.
-    const BlockResult::Matrix6 covariance = variance_factor * result.frame_covariance[m.frame];
-    const Eigen::Matrix3d rotation_covariance = turn * covariance.topLeftCorner<3, 3>() * turn.transpose(),
-                          position_covariance = stretch * covariance.bottomRightCorner<3, 3>() * stretch.transpose();
+    const auto of_rotation = [&](const BlockResult::Matrix6& c) -> Eigen::Matrix3d {
+      return turn * c.topLeftCorner<3, 3>() * turn.transpose() + truth_rotation;
+    };
+    const auto of_position = [&](const BlockResult::Matrix6& c) -> Eigen::Matrix3d {
+      return stretch * c.bottomRightCorner<3, 3>() * stretch.transpose() + truth_position;
+    };
+    const BlockResult::Matrix6 covariance = variance_factor * aligned.covariances.frames[i];
+    const Eigen::Matrix3d rotation_covariance = of_rotation(covariance), position_covariance = of_position(covariance);
+    const bool empirical = !aligned.empirical.frames.empty();
     const Frame& frame = frames[m.frame];
     const bool by_place = !result.boundary.empty();
     const std::size_t place = by_place && result.boundary[m.frame] != 0;
     if (!(attitudes_used && frame.attitude_prior && held(*frame.attitude_prior))) {
       normalised_rotation.add(angle, rotation_covariance);
+      if (empirical) empirical_rotation.add(angle, of_rotation(aligned.empirical.frames[i]));
       if (by_place) rotation_by_place[place].add(angle, rotation_covariance);
     }
     if (!(positions_used && frame.position_prior && held(*frame.position_prior))) {
       normalised_position.add(error, position_covariance);
+      if (empirical) empirical_position.add(error, of_position(aligned.empirical.frames[i]));
       if (by_place) position_by_place[place].add(error, position_covariance);
     }
   }
   evaluation.frames = position.count();
-  evaluation.with_sigmas = !result.frame_covariance.empty();
+  evaluation.with_sigmas = !aligned.covariances.frames.empty();
+  evaluation.sigma_note = aligned.covariances.note;
   evaluation.position_rms_m = position.value();
   evaluation.position_max_m = largest;
   evaluation.rotation_rms_deg = rotation.value() * 180 / std::numbers::pi;
   evaluation.relative_position_rms_m = relative.value();
   evaluation.normalised_error_position = normalised_position.value();
   evaluation.normalised_error_rotation = normalised_rotation.value();
+  evaluation.empirical_error_position = empirical_position.value();
+  evaluation.empirical_error_rotation = empirical_rotation.value();
   evaluation.normalised_error_position_interior = position_by_place[0].value();
   evaluation.normalised_error_rotation_interior = rotation_by_place[0].value();
   evaluation.normalised_error_position_boundary = position_by_place[1].value();
@@ -193,7 +228,7 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
 
 void evaluate_control(const BlockResult& result, double variance_factor, Evaluation& evaluation) {
   RootMeanSquare control, check, horizontal, vertical;
-  NormalisedError normalised;
+  NormalisedError normalised, empirical;
   for (std::size_t i = 0; i < result.control.size(); ++i) {
     const ControlPoint& point = result.block.control_points[i];
     const BlockResult::ControlResult& found = result.control[i];
@@ -208,6 +243,7 @@ void evaluate_control(const BlockResult& result, double variance_factor, Evaluat
     // difference is no error, and it has no normalised one here.
     const Eigen::Matrix3d stated = point.sigma.cwiseAbs2().asDiagonal();
     normalised.add(error, variance_factor * found.covariance + stated);
+    if (i < result.empirical.control.size()) empirical.add(error, result.empirical.control[i] + stated);
   }
   evaluation.check_points = check.count();
   evaluation.control_points = control.count();
@@ -216,6 +252,7 @@ void evaluate_control(const BlockResult& result, double variance_factor, Evaluat
   evaluation.check_rms_vertical_m = vertical.value();
   evaluation.control_rms_m = control.value();
   evaluation.normalised_error_check = normalised.value();
+  evaluation.empirical_error_check = empirical.value();
 }
 
 }  // namespace
@@ -226,10 +263,10 @@ Evaluation evaluate(const BlockResult& result, const PoseTable& truth, const Eva
   evaluation.frames_missing = static_cast<std::int64_t>(truth.names.size() - matches.size());
   evaluation.aligned = options.align == EvaluateOptions::Align::kAlways ||
                        (options.align == EvaluateOptions::Align::kAuto && is_free(result));
-  const Similarity similarity = evaluation.aligned ? align(result, matches) : Similarity();
+  const Aligned aligned = evaluation.aligned ? align(result, matches) : as_it_is(result, matches);
   // Never twice.
   const double variance_factor = options.scale_sigma && !result.sigma_scaled ? result.variance_factor : 1;
-  evaluate_frames(result, matches, similarity, variance_factor, evaluation);
+  evaluate_frames(result, matches, aligned, variance_factor, options, evaluation);
   // The given positions of check points are in the ground frame of the block. A free block is in another frame, so they
   // cannot be compared.
   if (!evaluation.aligned) evaluate_control(result, variance_factor, evaluation);
@@ -279,7 +316,13 @@ std::string to_text(const Evaluation& e) {
   add(e.with_sigmas, "rotation", e.normalised_error_rotation);
   add(std::isfinite(e.normalised_error_check), "check points", e.normalised_error_check);
   if (!ratios.empty())
-    text += "\nerror / stated sigma        " + ratios + " (1: the sigmas are true" + (some_held ? "; -: held)" : ")");
+    text += "\nerror / formal sigma        " + ratios + " (1: the sigmas are true" + (some_held ? "; -: held)" : ")");
+  ratios.clear();
+  add(std::isfinite(e.empirical_error_position), "position", e.empirical_error_position);
+  add(std::isfinite(e.empirical_error_rotation), "rotation", e.empirical_error_rotation);
+  add(std::isfinite(e.empirical_error_check), "check points", e.empirical_error_check);
+  if (!ratios.empty()) text += "\nerror / empirical sigma     " + ratios;
+  if (!e.sigma_note.empty()) text += "\n" + e.sigma_note;
   return text;
 }
 
@@ -294,15 +337,19 @@ std::string to_json(const Evaluation& e) {
   json["relative_position_rms_m"] = e.relative_position_rms_m;
   json["normalised_error_position"] = e.normalised_error_position;
   json["normalised_error_rotation"] = e.normalised_error_rotation;
+  json["empirical_error_position"] = e.empirical_error_position;
+  json["empirical_error_rotation"] = e.empirical_error_rotation;
   json["normalised_error_position_interior"] = e.normalised_error_position_interior;
   json["normalised_error_rotation_interior"] = e.normalised_error_rotation_interior;
   json["normalised_error_position_boundary"] = e.normalised_error_position_boundary;
   json["normalised_error_rotation_boundary"] = e.normalised_error_rotation_boundary;
+  json["sigma_note"] = e.sigma_note;
   json["check_points"] = e.check_points;
   json["check_rms_m"] = e.check_rms_m;
   json["check_rms_horizontal_m"] = e.check_rms_horizontal_m;
   json["check_rms_vertical_m"] = e.check_rms_vertical_m;
   json["normalised_error_check"] = e.normalised_error_check;
+  json["empirical_error_check"] = e.empirical_error_check;
   json["control_points"] = e.control_points;
   json["control_rms_m"] = e.control_rms_m;
   return json.dump(2);

@@ -41,15 +41,23 @@ struct TileCondensation {
   TileFactor factor;
 };
 
-// The constraints and right-hand sides that the datum of a free block adds to a tile (gauge.h). Empty when priors fix
-// the datum.
+// What the clusters of a tile's points need besides its problem (cluster_scores.h).
+struct ClusterWeights {
+  std::vector<std::uint8_t> leverages;  // [points] the trace h in units of 1 / 32; 0 where the point takes no part
+  std::vector<double> extents;          // [cameras] of the part of the images that has observations, px
+  double concentration = 1;             // of the hat matrices of single points
+};
+
+// What a sweep adds to a tile besides its observations: the constraints and right-hand sides of the datum of a free
+// block (gauge.h), and the scores of its clusters (cluster_scores.h). Empty when priors fix the datum.
 struct TileDatum {
   struct Hold {
     UnknownId frame;
     Eigen::Matrix<double, 6, Eigen::Dynamic> directions;  // along which the frame is held
   };
   std::vector<Hold> holds;
-  Step columns{{}, 0, {}};  // further right-hand sides
+  Step columns{{}, 0, {}};                   // further right-hand sides
+  const ClusterWeights* clusters = nullptr;  // of a sweep for the empirical covariances; else nullptr
 };
 
 // The linearisation and the damping of a sweep. A plain number stands for a sweep with this lambda and without
@@ -106,6 +114,9 @@ TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const
 struct TileCovariance {
   CovarianceMatrix boundary;                        // as given
   std::vector<Eigen::Matrix<double, 6, 6>> frames;  // [frames]; zero where untouched
+  // [frames] where the datum is free: after the best-fit similarity of all positions of the part
+  // (inner_constraints.h). NaN where this does not exist.
+  std::vector<Eigen::Matrix<double, 6, 6>> aligned_frames;
   std::vector<Eigen::MatrixXd> cameras;  // [cameras] covariance of the model's parameters; zero for held ones
   std::vector<Eigen::Matrix<double, 6, 6>> mounts;  // [mounts]
   std::vector<Eigen::Matrix3d> points;              // [points]; zero for points that take no part
@@ -114,6 +125,9 @@ struct TileCovariance {
   // io/evaluation/reliability.h), for residuals as the loss weights them: 1 - diag(J C J') / sigma^2. NaN for
   // observations that take no part. [observations]
   std::vector<float> redundancy_x, redundancy_y;
+  // tr P^2 over (tr P)^2 / r of single tie points, P their hat matrix of rank r (cluster_scores.h): 1 where all directions
+  // take part alike. From a sample of the points.
+  double concentration = 1;
   // [points] The further columns (3 x columns), where they were asked for.
   std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> point_columns;
 };

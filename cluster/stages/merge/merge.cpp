@@ -168,6 +168,7 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
     follow(block, tiles);
     if (last) {
       find_posterior(job, inputs, references, runner, adjusted);
+      if (job.settings.merge.empirical_sigmas) find_empirical(job, runner, adjusted);
       adjusted.costs = gather_costs(job, tiles, runner);
       say_costs(job, adjusted.costs);
       break;
