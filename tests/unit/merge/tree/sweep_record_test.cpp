@@ -24,7 +24,10 @@ UpdateMatrix made_up_update(double value) {
 
 NodeFactors made_up_factors(double value) {
   NodeFactors factors;
+  factors.front.eliminated = {{{UnknownKind::kFrame, 0, 0}, 1}};
+  factors.front.separator = {{{UnknownKind::kFrame, 0, 1}, 999}};
   factors.front.factor.assign(1000, value);
+  factors.front.z.assign(1, 0.5);
   return factors;
 }
 
