@@ -23,6 +23,7 @@
 #include "adjust/orientation/steps/levelling.h"
 #include "adjust/orientation/straight_line.h"
 #include "adjust/tile/consistent_rays.h"
+#include "geometry/numbers/median.h"
 #include "geometry/similarity/minimal_control.h"
 #include "geometry/similarity/minimal_similarity.h"
 #include "io/block/held_priors.h"
@@ -34,7 +35,6 @@ namespace {
 constexpr double kMark_px = 10;  // marks of a point meet within it in the first orientation (orientation.cpp, adjust())
 constexpr double kAgree = 4;     // times the rms of the best points
 constexpr std::size_t kMostSamples = 4000;  // all samples of three among 29 points
-constexpr double kNowhere = std::numeric_limits<double>::infinity();
 
 // A control point as the block sees it.
 struct SeenControl {
@@ -47,10 +47,10 @@ struct SeenControl {
   bool full() const { return place() && height(); }
 };
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+Eigen::Vector3d centroid(const std::vector<Eigen::Vector3d>& places) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& place : places) sum += place;
+  return sum / static_cast<double>(places.size());
 }
 
 class ControlAligner {
@@ -73,7 +73,7 @@ class ControlAligner {
       if (const double r = residual_px(*best_, point); r <= limit) fitting.push_back(r);
     result.agreeing = std::ssize(fitting);
     if (2 * result.agreeing <= result.points || fitting.size() < 2) return std::nullopt;
-    result.median_residual_px = median_of(std::move(fitting));
+    result.median_residual_px = median(std::move(fitting));
     result.on_a_line = level(result.similarity);
     if (metric_) keep_scale(result.similarity);
     return result;
@@ -113,7 +113,7 @@ class ControlAligner {
     const Eigen::Vector3d model = similarity.inverse()(target);
     std::vector<double> distances;
     for (const PointView& mark : point.marks) distances.push_back(residual_sigmas(mark, model));
-    return median_of(std::move(distances));
+    return median(std::move(distances));
   }
 
   // The number h of points that decide on a similarity.
@@ -212,19 +212,28 @@ class ControlAligner {
     points_ = {p, q};
   }
 
+  // The points with all coordinates that agree with a similarity, in both frames.
+  struct PlacePairs {
+    std::vector<Eigen::Vector3d> model, ground;
+  };
+  PlacePairs agreeing_places(const Similarity& similarity) const {
+    PlacePairs pairs;
+    const double limit = limit_of(similarity);
+    for (const SeenControl& point : points_) {
+      if (!point.full() || !(residual_px(similarity, point) <= limit)) continue;
+      pairs.model.push_back(*point.model);
+      pairs.ground.push_back(point.ground);
+    }
+    return pairs;
+  }
+
   // Fits the similarity to the points that agree, as long as this makes it better.
   void refine() {
     constexpr int kRounds = 10;
     for (int round = 0; round < kRounds; ++round) {
-      std::vector<Eigen::Vector3d> from, to;
-      const double limit = limit_of(*best_);
-      for (const SeenControl& point : points_) {
-        if (!point.full() || !(residual_px(*best_, point) <= limit)) continue;
-        from.push_back(*point.model);
-        to.push_back(point.ground);
-      }
-      if (from.size() < 3) return;
-      const auto fitted = fit_similarity(from, to);
+      const PlacePairs pairs = agreeing_places(*best_);
+      if (pairs.model.size() < 3) return;
+      const auto fitted = fit_similarity(pairs.model, pairs.ground);
       if (!fitted) return;
       const double before = best_squares_;
       propose(*fitted);
@@ -235,15 +244,11 @@ class ControlAligner {
   // Turns the block about the line of its control so that the images look or stand as they should. Returns whether the
   // points lie on a line.
   bool level(Similarity& similarity) const {
-    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-    std::vector<Eigen::Vector3d> agreeing;
-    const double limit = limit_of(similarity);
-    for (const SeenControl& point : points_)
-      if (point.full() && residual_px(similarity, point) <= limit) agreeing.push_back(point.ground);
-    if (agreeing.size() < 2) return false;
-    for (const Eigen::Vector3d& place : agreeing) mean += place / static_cast<double>(agreeing.size());
+    const std::vector<Eigen::Vector3d> places = agreeing_places(similarity).ground;
+    if (places.size() < 2) return false;
+    const Eigen::Vector3d mean = centroid(places);
     Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-    for (const Eigen::Vector3d& place : agreeing) scatter += (place - mean) * (place - mean).transpose();
+    for (const Eigen::Vector3d& place : places) scatter += (place - mean) * (place - mean).transpose();
     const auto line = straight_line(scatter);
     if (!line) return false;
     const Eigen::Vector3d down = which_points_down(mean_axes(similarity), *line, distance(similarity));
@@ -254,18 +259,10 @@ class ControlAligner {
   }
   // Sets the scale to one, with the centroid of the points that agree in its place.
   void keep_scale(Similarity& similarity) const {
-    Eigen::Vector3d model = Eigen::Vector3d::Zero(), ground = Eigen::Vector3d::Zero();
-    double count = 0;
-    const double limit = limit_of(similarity);
-    for (const SeenControl& point : points_) {
-      if (!point.full() || !(residual_px(similarity, point) <= limit)) continue;
-      model += *point.model;
-      ground += point.ground;
-      ++count;
-    }
-    if (count == 0) return;
+    const PlacePairs pairs = agreeing_places(similarity);
+    if (pairs.model.empty()) return;
     similarity.scale = 1;
-    similarity.translation = ground / count - similarity.rotation * (model / count);
+    similarity.translation = centroid(pairs.ground) - similarity.rotation * centroid(pairs.model);
   }
   MeanAxes mean_axes(const Similarity& similarity) const {
     MeanAxes axes;
@@ -290,7 +287,7 @@ class ControlAligner {
     for (const SeenControl& point : points_)
       for (const PointView& mark : point.marks)
         if (point.full()) distances.push_back((similarity(mark.camera.centre) - point.ground).norm());
-    return median_of(std::move(distances));
+    return median(std::move(distances));
   }
 
   const Block& block_;
@@ -299,7 +296,7 @@ class ControlAligner {
   std::vector<SeenControl> points_;
   bool metric_ = false;
   std::optional<Similarity> best_;
-  double best_squares_ = kNowhere;
+  double best_squares_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace

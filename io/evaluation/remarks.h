@@ -43,9 +43,9 @@ std::vector<std::string> misstated_texts(const BlockResult& result);
 // degrees, ...". Robust losses give them little weight, so they hardly appear in the statistics of their kind.
 std::vector<std::string> contradicted_texts(const BlockResult& result, const report::Figures& figures);
 // The control and check points that the block contradicts, and single marks that were rejected, one line each:
-// "1 of 10 control points differs from the block by more than 6 sigmas and has hardly any weight: gcp02 by 10.01 m (its
-// marks fit within 0.4 px: check its coordinates)", "1 mark of control points is rejected: gcp05 by 312 px in
-// IMG_0043.JPG". A point of which no mark takes part is in unused_points_text.
+// "1 of 10 control points differs from the block by more than 6 sigmas and has hardly any weight: gcp02 by 10.0 m (its
+// marks fit within 0.4 px); check its coordinates and its name", "1 mark of control and check points is rejected: gcp05
+// in IMG_0043.JPG by 312 px". A point of which no mark takes part is in unused_points_text.
 std::vector<std::string> wrong_control_texts(const BlockResult& result);
 // A line if so many tie point observations of a block with a free datum are near the limit of screening that the result
 // depends on the tiles: "359 of 83718 tie point observations (0.43 %) lie within 10 % of the limit of screening, ...".

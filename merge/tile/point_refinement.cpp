@@ -104,8 +104,10 @@ class PointCosts {
                    problem_.inverse_sigma[row]);
         if (lanes_.size() == ObservationLanes::kUsual) flush(trials, costs);
       }
-      if (const std::int64_t i = prior_[static_cast<std::size_t>(point)]; i >= 0)
-        add_prior(problem_.point_priors[static_cast<std::size_t>(i)], position, costs[t]);
+      if (const std::int64_t i = prior_[static_cast<std::size_t>(point)]; i >= 0) {
+        const TileProblem::PointTerm& term = problem_.point_priors[static_cast<std::size_t>(i)];
+        costs[t].add_prior(loss_of(problem_, term), term, position);
+      }
     }
     flush(trials, costs);
   }
@@ -116,9 +118,6 @@ class PointCosts {
     std::int64_t row;
   };
 
-  void add_prior(const TileProblem::PointTerm& term, const Eigen::Vector3d& position, PointCost& cost) const {
-    cost.add_prior(loss_of(problem_, term), term, position);
-  }
   void flush(std::span<const Trial> trials, std::vector<PointCost>& costs) {
     lanes_.linearise();
     for (std::int64_t lane = 0; lane < lanes_.size(); ++lane) {

@@ -15,6 +15,7 @@
 
 #include "adjust/orientation/steps/levelling.h"
 #include "geometry/numbers/decompositions.h"
+#include "geometry/numbers/median.h"
 
 namespace megablock {
 
@@ -49,11 +50,6 @@ struct KnownPositions {
   double stated_sigma = 0;    // mean of the priors
 };
 
-double median_of(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
-
 // The centres of oriented frames and the positions that are known of them, with sigmas that allow for the bend of the
 // first centres over the block: a twentieth of the median distance from its middle, in squares with the stated sigma.
 KnownPositions known_positions(const OrientationGraph& graph, const OrientationValues& values) {
@@ -73,11 +69,11 @@ KnownPositions known_positions(const OrientationGraph& graph, const OrientationV
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> coordinates;
     for (const auto& p : known.to) coordinates.push_back(p[axis]);
-    middle[axis] = median_of(std::move(coordinates));
+    middle[axis] = median(std::move(coordinates));
   }
   std::vector<double> distances;
   for (const auto& p : known.to) distances.push_back((p - middle).norm());
-  const double bend = 0.05 * median_of(std::move(distances));
+  const double bend = 0.05 * median(std::move(distances));
   for (double& sigma : known.sigma) sigma = std::hypot(sigma, bend);
   return known;
 }

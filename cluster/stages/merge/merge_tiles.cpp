@@ -103,7 +103,10 @@ void set_losses(const Job& job, bool near, TileStore& tiles) {
   const ObservationOptions& options = job.settings.adjustment.observations;
   for (std::size_t row = 0; row < tiles.size(); ++row)
     tiles.change_outline(row, [&](RankTile& tile) {
-      near ? set_last_losses(tile.problem, options) : set_losses_from_afar(tile.problem, options);
+      if (near)
+        set_last_losses(tile.problem, options);
+      else
+        set_losses_from_afar(tile.problem, options);
     });
 }
 

@@ -90,12 +90,8 @@ PositionTable read_geo(const PositionText& text, const PositionOptions& options)
         row.angles = *options.angles;
       }
     }
-    if (fields.text.size() >= kGeoAccuracies + 2) {
-      row.sigma_horizontal_m =
-          position_sigma_m(fields.text[kGeoAccuracies], fields.separator, "horizontal accuracy", where);
-      row.sigma_vertical_m =
-          position_sigma_m(fields.text[kGeoAccuracies + 1], fields.separator, "vertical accuracy", where);
-    }
+    if (fields.text.size() >= kGeoAccuracies + 2)
+      read_sigmas(fields.text, kGeoAccuracies, fields.separator, where, row);
     table.rows.push_back(row);
   }
   if (angles && !options.angles)

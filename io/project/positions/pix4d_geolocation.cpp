@@ -83,10 +83,7 @@ PositionTable read_pix4d(const PositionText& text, const PositionOptions& option
       row.angles_deg = {number(4, "first angle"), number(5, "second angle"), number(6, "third angle")};
       row.angles = *kind;
     }
-    if (count == kPix4dPlace + 2 || count == kPix4dPlace + 5) {
-      row.sigma_horizontal_m = position_sigma_m(fields[count - 2], separator, "accuracy horz", where);
-      row.sigma_vertical_m = position_sigma_m(fields[count - 1], separator, "accuracy vert", where);
-    }
+    if (count == kPix4dPlace + 2 || count == kPix4dPlace + 5) read_sigmas(fields, count - 2, separator, where, row);
     table.rows.push_back(row);
   }
   if (angles && !kind)

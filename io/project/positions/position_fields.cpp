@@ -49,6 +49,12 @@ double position_sigma_m(const std::string& text, Separator separator, const std:
   return sigma;
 }
 
+void read_sigmas(const std::vector<std::string>& fields, std::size_t first, Separator separator,
+                 const std::string& where, PositionTable::Row& row) {
+  row.sigma_horizontal_m = position_sigma_m(fields[first], separator, "horizontal accuracy", where);
+  row.sigma_vertical_m = position_sigma_m(fields[first + 1], separator, "vertical accuracy", where);
+}
+
 double calendar_seconds(int year, int month, int day, double seconds_of_day) {
   const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
                                          std::chrono::day(static_cast<unsigned>(day))};

@@ -20,6 +20,10 @@ double position_degrees(const std::string& text, Separator separator, const std:
 double position_sigma_m(const std::string& text, Separator separator, const std::string& what,
                         const std::string& where);
 
+// Reads a horizontal and a vertical sigma from two fields that follow each other, by position_sigma_m().
+void read_sigmas(const std::vector<std::string>& fields, std::size_t first, Separator separator,
+                 const std::string& where, PositionTable::Row& row);
+
 // Seconds since 1970-01-01 of a date and time of day, without leap seconds. NaN for a date that does not exist.
 double calendar_seconds(int year, int month, int day, double seconds_of_day);
 
