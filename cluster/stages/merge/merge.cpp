@@ -56,11 +56,22 @@ std::vector<std::int64_t> observation_counts(const Job& job, const MergeInputs& 
   return counts;
 }
 
-// Estimated and scaled sigmas change the weights, so that they need rounds of their own to settle.
-int most_rounds(const MergeSettings& settings, const SigmaScales& scales) {
+// A block that does not converge with losses that pull from any distance has not come near its solution, and losses
+// that ignore what is far off would hold it where it is. Most often outliers keep it away; a screening
+// removes those, and the block begins from afar once more.
+constexpr int kMostRoundsAfar = 3;
+
+// Estimated and scaled sigmas change the weights, so that they need rounds of their own to settle. Rounds from afar
+// beyond the first do not count.
+int most_rounds(const MergeSettings& settings, const MergePosition& position) {
   constexpr int kSigmaRounds = 10, kScaleRounds = 1;
-  if (settings.estimate_sigmas) return std::max(settings.screening_rounds, kSigmaRounds);
-  return settings.screening_rounds + (scales.matter() ? kScaleRounds : 0);
+  const int repeated = std::max(0, position.rounds_afar - 1);
+  if (settings.estimate_sigmas) return std::max(settings.screening_rounds, kSigmaRounds) + repeated;
+  return settings.screening_rounds + (position.scales.matter() ? kScaleRounds : 0) + repeated;
+}
+
+bool converged(const GlobalState& state) {
+  return state.outcome == GlobalOutcome::kConverged || state.outcome == GlobalOutcome::kRoundingFloor;
 }
 
 // Clears the scratch folder of the job. The folder itself stays, because another disk may be mounted there. Folders of
@@ -151,8 +162,9 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
   recorder.set_position([&] { return checkpoint.of_sweep(position); });
   std::int32_t saved = position.global.accepted;
   for (;;) {
-    const bool last = position.round >= most_rounds(job.settings.merge, position.scales);
-    const bool near = last || position.round > 0;  // the first round has come from afar
+    const bool last = position.round >= most_rounds(job.settings.merge, position);
+    if (last) position.near = 1;
+    const bool near = position.near != 0;
     const GlobalOptions options = options_of(job.settings.merge, frames, near, last);
     set_losses(job, near, tiles);
     MergeTreeRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(memory, tiles));
@@ -170,8 +182,7 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
       if (job.ranks.any(stop_requested()))
         throw AgreedError<Interrupted>("stopped in stage 'merge' as asked; run the same command to resume");
     });
-    adjusted.converged = position.global.outcome == GlobalOutcome::kConverged ||
-                         position.global.outcome == GlobalOutcome::kRoundingFloor;
+    adjusted.converged = converged(position.global);
     block = gather_state(job, block, tiles, runner);
     follow(block, tiles);
     if (last) {
@@ -185,7 +196,11 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
     if (job.settings.merge.scale_contradicted_sigmas && near)
       changed = adopt_contradicted_scales(job, tiles, position.scales) || changed;
     changed = screen(job, tiles) > 0 || changed;
-    position.round = changed ? position.round + 1 : most_rounds(job.settings.merge, position.scales);
+    if (!near) {
+      ++position.rounds_afar;
+      position.near = adjusted.converged || position.rounds_afar == kMostRoundsAfar;
+    }
+    position.round = changed ? position.round + 1 : most_rounds(job.settings.merge, position);
     position.tried_steps += position.global.iterations;
     const std::int32_t accepted = position.global.accepted;
     position.global = start_global(options);

@@ -43,8 +43,9 @@ TileAdjustment snapshot(const RankTile& tile) {
 std::string tile_unit(const std::string& folder, std::int64_t tile) { return unit_name(folder, tile); }
 
 // The layout of the marker as docs/reference/file-formats.md describes it.
-static_assert(sizeof(MergePosition) == 112 + 8 * kObservationKinds && offsetof(MergePosition, tried_steps) == 4 &&
+static_assert(sizeof(MergePosition) == 120 + 8 * kObservationKinds && offsetof(MergePosition, tried_steps) == 4 &&
               offsetof(MergePosition, global) == 8 && offsetof(MergePosition, scales) == 112 &&
+              offsetof(MergePosition, rounds_afar) == 112 + 8 * kObservationKinds &&
               offsetof(GlobalState, lambda) == 8 && offsetof(GlobalState, decrement_squared) == 48 &&
               offsetof(GlobalState, accepted) == 84 && offsetof(GlobalState, curvature) == 88);
 

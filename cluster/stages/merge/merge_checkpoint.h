@@ -19,7 +19,9 @@ struct MergePosition {
   std::int32_t round = 0;        // number of the round of screening
   std::int32_t tried_steps = 0;  // in earlier adjustments
   GlobalState global;
-  SigmaScales scales;  // factors of the stated sigmas
+  SigmaScales scales;            // factors of the stated sigmas
+  std::int32_t rounds_afar = 0;  // ended adjustments with losses that pull from any distance (prior_scales.h)
+  std::int32_t near = 0;         // 1: the losses are those of the options
 };
 
 class MergeCheckpoint {
