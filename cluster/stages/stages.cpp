@@ -92,6 +92,7 @@ constexpr Stage kStages[] = {
      .makes = "features/<shard>.h5",
      .unit = "64 images",
      .parts = "images",
+     .algorithm = 2,
      .sections = {&kFeatureSection},
      .kind = "features",
      .read_file = [](const std::string& path) { read_features(path); },

@@ -23,6 +23,8 @@ using SiftDescriptor = std::array<std::uint8_t, 128>;
 struct ImageFeatures {
   ImageIndex image;
   std::int32_t width = 0, height = 0;  // of the decoded image, pixels; 0 if it failed
+  // The grey values of the file that all but a thousandth of its pixels keep to on either side.
+  std::array<float, 2> grey_range{};
   std::vector<Keypoint> keypoints;     // by falling scale, then by x and y
   std::vector<SiftDescriptor> descriptors;
   std::array<float, 128> global_descriptor{};  // unit norm; finds neighbours of images without a position

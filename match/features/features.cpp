@@ -178,12 +178,12 @@ void detect_and_describe(const cv::Mat& pixels, const cv::Mat& mask, const Featu
 }
 
 // Reads an image and its mask. Returns the reason of a failure, or an empty string.
-std::string load(const std::string& path, const std::string& mask_path, cv::Mat& pixels, cv::Mat& mask) {
-  GreyImage image = read_grey_image(path);
+std::string load(const std::string& path, const std::string& mask_path, GreyImage& image, cv::Mat& mask) {
+  image = read_grey_image(path);
   if (!image.failure.empty()) return image.failure;
-  pixels = image.pixels;
+  const cv::Mat& pixels = image.pixels;
   if (mask_path.empty()) return {};
-  GreyImage mask_image = read_grey_image(mask_path);
+  GreyImage mask_image = read_mask(mask_path);
   if (!mask_image.failure.empty()) return "mask " + mask_path + ": " + mask_image.failure;
   if (mask_image.pixels.size() != pixels.size()) {
     return "mask " + mask_path + " has " + std::to_string(mask_image.pixels.cols) + " x " +
@@ -202,9 +202,11 @@ ImageFeatures detect_features(const std::string& path, const std::string& mask_p
   use_one_opencv_thread();
   ImageFeatures features;
   features.image = image;
-  cv::Mat pixels, mask;
-  features.failure = load(path, mask_path, pixels, mask);
+  GreyImage grey;
+  cv::Mat mask;
+  features.failure = load(path, mask_path, grey, mask);
   if (!features.failure.empty()) return features;
+  const cv::Mat& pixels = grey.pixels;
   try {
     detect_and_describe(pixels, mask, options, features);
   } catch (const cv::Exception& e) {
@@ -214,6 +216,7 @@ ImageFeatures detect_features(const std::string& path, const std::string& mask_p
   }
   features.width = pixels.cols;
   features.height = pixels.rows;
+  features.grey_range = {static_cast<float>(grey.dark), static_cast<float>(grey.bright)};
   features.global_descriptor = global_descriptor(features.descriptors);
   return features;
 }

@@ -1,10 +1,17 @@
 #include "match/images/image_file.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <system_error>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "io/images/image_codec.h"
@@ -55,15 +62,81 @@ bool read_bytes(const std::string& path, std::vector<unsigned char>& bytes) {
   return static_cast<bool>(stream);
 }
 
-// Stretches the range of grey values to 8 bits.
-cv::Mat to_eight_bits(const cv::Mat& pixels) {
-  if (pixels.depth() == CV_8U) return pixels;
-  double darkest = 0, brightest = 0;
-  cv::minMaxLoc(pixels, &darkest, &brightest);
-  const double scale = brightest > darkest ? 255 / (brightest - darkest) : 0;
-  cv::Mat stretched;
-  pixels.convertTo(stretched, CV_8U, scale, -darkest * scale);
-  return stretched;
+// Counts how often each value occurs, and finds the two quantiles. `cut` pixels lie outside on either side at most.
+template <typename T>
+std::pair<double, double> range_of_integers(const cv::Mat& pixels, std::int64_t cut) {
+  std::vector<std::int64_t> counts(std::size_t{std::numeric_limits<T>::max()} + 1, 0);
+  for (int row = 0; row < pixels.rows; ++row) {
+    const T* values = pixels.ptr<T>(row);
+    for (int column = 0; column < pixels.cols; ++column) ++counts[values[column]];
+  }
+  const auto quantile = [cut](auto first, auto last) {
+    std::int64_t passed = 0;
+    auto value = first;
+    while (std::next(value) != last && (passed += *value) <= cut) ++value;
+    return value;
+  };
+  const auto dark = quantile(counts.begin(), counts.end()) - counts.begin();
+  const auto bright = counts.rend() - quantile(counts.rbegin(), counts.rend()) - 1;
+  return {static_cast<double>(dark), static_cast<double>(bright)};
+}
+
+std::pair<double, double> range_of_numbers(const cv::Mat& pixels, std::int64_t cut) {
+  cv::Mat all;
+  pixels.convertTo(all, CV_64F);
+  std::vector<double> values(all.begin<double>(), all.end<double>());
+  std::erase_if(values, [](double value) { return !std::isfinite(value); });
+  if (values.empty()) return {0, 0};
+  cut = std::min(cut, static_cast<std::int64_t>(values.size() - 1) / 2);
+  std::nth_element(values.begin(), values.begin() + cut, values.end());
+  const double dark = values[static_cast<std::size_t>(cut)];
+  std::nth_element(values.begin(), values.end() - 1 - cut, values.end());
+  return {dark, *(values.end() - 1 - cut)};
+}
+
+// The values that all but a thousandth of the pixels keep to on either side.
+std::pair<double, double> grey_range(const cv::Mat& pixels) {
+  const auto cut = static_cast<std::int64_t>(pixels.total() / 1000);
+  if (pixels.depth() == CV_8U) return range_of_integers<std::uint8_t>(pixels, cut);
+  if (pixels.depth() == CV_16U) return range_of_integers<std::uint16_t>(pixels, cut);
+  return range_of_numbers(pixels, cut);
+}
+
+GreyImage in_eight_bits(const cv::Mat& pixels) {
+  GreyImage image;
+  std::tie(image.dark, image.bright) = grey_range(pixels);
+  if (pixels.depth() == CV_8U) {
+    image.pixels = pixels;
+    return image;
+  }
+  const double scale = image.bright > image.dark ? 255 / (image.bright - image.dark) : 0;
+  pixels.convertTo(image.pixels, CV_8U, scale, -image.dark * scale);
+  return image;
+}
+
+GreyImage failed(std::string reason) {
+  GreyImage image;
+  image.failure = std::move(reason);
+  return image;
+}
+
+// The pixels of a file with all their bits, or the failure.
+GreyImage decode(const std::string& path) {
+  std::vector<unsigned char> bytes;
+  if (!read_bytes(path, bytes)) return failed("file missing or not readable");
+  if (bytes.empty()) return failed("empty file (0 bytes)");
+  // Decoders fill the missing part of a truncated file with grey, without an error.
+  if (is_jpeg(bytes) && !is_complete_jpeg(bytes)) return failed("truncated JPEG: the file ends before the image does");
+  try {
+    const cv::Mat decoded =
+        decode_image(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+    if (decoded.empty()) return failed("not an image, damaged, or of an unsupported format");
+    GreyImage image;
+    image.pixels = decoded;
+    return image;
+  } catch (const cv::Exception& e) {
+    return failed("cannot be decoded: " + e.err);
+  }
 }
 
 }  // namespace
@@ -88,19 +161,14 @@ bool is_complete_jpeg(std::span<const unsigned char> file) {
 }
 
 GreyImage read_grey_image(const std::string& path) {
-  std::vector<unsigned char> bytes;
-  if (!read_bytes(path, bytes)) return {{}, "file missing or not readable"};
-  if (bytes.empty()) return {{}, "empty file (0 bytes)"};
-  // Decoders fill the missing part of a truncated file with grey, without an error.
-  if (is_jpeg(bytes) && !is_complete_jpeg(bytes)) return {{}, "truncated JPEG: the file ends before the image does"};
-  try {
-    const cv::Mat decoded =
-        decode_image(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
-    if (decoded.empty()) return {{}, "not an image, damaged, or of an unsupported format"};
-    return {to_eight_bits(decoded), {}};
-  } catch (const cv::Exception& e) {
-    return {{}, "cannot be decoded: " + e.err};
-  }
+  GreyImage image = decode(path);
+  return image.failure.empty() ? in_eight_bits(image.pixels) : image;
+}
+
+GreyImage read_mask(const std::string& path) {
+  GreyImage mask = decode(path);
+  if (mask.failure.empty()) mask.pixels = mask.pixels != 0;
+  return mask;
 }
 
 }  // namespace megablock

@@ -105,7 +105,7 @@ ImageVertical find_image_vertical(const std::string& path, const Camera& camera,
   }
   GreyImage mask;
   if (!camera.mask_path.empty()) {
-    mask = read_grey_image(camera.mask_path);
+    mask = read_mask(camera.mask_path);
     if (mask.failure.empty() && mask.pixels.size() != image.pixels.size())
       mask.failure = "has " + size_of(mask.pixels) + " pixels, the image " + size_of(image.pixels);
     if (!mask.failure.empty()) {

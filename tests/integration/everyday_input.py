@@ -21,9 +21,9 @@ class EverydayInput(CopyOfTheBlock):
     def write_project(self, text):
         self.project.write_text(f"images: images\n{text}{OPTIONS}")
 
-    def assert_all_oriented(self, images=12):
+    def assert_all_oriented(self, images=12, oriented=None):
         state = status(self.job)
-        self.assertEqual((state["images"], state["oriented"]), (images, images))
+        self.assertEqual((state["images"], state["oriented"]), (images, oriented or images))
 
     def test_leftovers_of_systems_are_no_images(self):
         for file in self.files()[:3]:
@@ -32,6 +32,15 @@ class EverydayInput(CopyOfTheBlock):
         (self.images / "Thumbs.db").write_bytes(bytes(600))
         self.run_job()
         self.assert_all_oriented()
+
+    def test_an_image_without_texture_is_named_with_its_grey_values(self):
+        dark = self.images / "dark.png"
+        pictures.write_png(dark, 480, 360, lambda y: bytes([0, 12]) * 480, bits=16)
+        self.write_project("")
+        self.run_job()
+        self.assert_all_oriented(13, 12)
+        self.assertIn("1 of 13 images has fewer than 50 keypoints: dark.png (0, grey values 12 to 12); check exposure, "
+                      "focus and masks", status(self.job)["notes"])
 
     def test_one_position_for_all_images_is_used_once(self):
         for file in self.files():

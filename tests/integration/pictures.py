@@ -84,13 +84,13 @@ def make_blank(file, width, height):
     file.write_bytes(b"\xff\xd8" + b"".join(blank) + b"\0" * -(-blocks // 4) + b"\xff\xd9")
 
 
-def write_png(file, width, height, row):
+def write_png(file, width, height, row, bits=8):
     """Writes a grey image; row(y) gives the bytes of a row."""
     def chunk(kind, content):
         return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 
     pixels = zlib.compressobj(1)
     with file.open("wb") as out:
-        out.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)))
+        out.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 0, 0, 0, 0)))
         packed = b"".join(pixels.compress(b"\0" + row(y)) for y in range(height)) + pixels.flush()
         out.write(chunk(b"IDAT", packed) + chunk(b"IEND", b""))

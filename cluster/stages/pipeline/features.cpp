@@ -1,11 +1,13 @@
 #include "cluster/stages/pipeline/features.h"
 
+#include <fmt/core.h>
 #include <omp.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "cluster/job/messages.h"
 #include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/save_times.h"
@@ -14,6 +16,7 @@
 #include "io/base/hash.h"
 #include "io/images/image_codec.h"
 #include "io/store/units/features_file.h"
+#include "io/text/counted.h"
 #include "match/features/features.h"
 
 namespace megablock {
@@ -133,18 +136,57 @@ void write_shard(const Job& job, JobRecord& record, const Shard& shard, const st
   write_features(path, growing.images());
 }
 
-// Records images without features as failures of the run, with their reasons.
+// Fewer keypoints than these hardly join an image to others.
+constexpr std::size_t kFewKeypoints = 50;
+
+// Images that were read, but have hardly any keypoint.
+class PoorImages {
+ public:
+  void add(const std::string& name, const ImageFeatures& image) {
+    constexpr int kNamed = 5;
+    if (image.keypoints.size() >= kFewKeypoints) return;
+    if (++count_ <= kNamed)
+      named_ += fmt::format("{}{} ({}, grey values {:.6g} to {:.6g})", count_ > 1 ? ", " : "", name,
+                            image.keypoints.size(), image.grey_range[0], image.grey_range[1]);
+    else
+      ++more_;
+  }
+  // "2 of 18 images have fewer than 50 keypoints: a.tif (3, grey values 12 to 14), ..."; empty if there are none.
+  std::string text(std::size_t images) const {
+    if (count_ == 0) return "";
+    return fmt::format("{} of {} {} fewer than {} keypoints: {}{}; check exposure, focus and masks", count_,
+                       counted(static_cast<std::int64_t>(images), "image"), count_ == 1 ? "has" : "have", kFewKeypoints,
+                       named_, more_ > 0 ? fmt::format(" and {} more", more_) : "");
+  }
+
+ private:
+  std::string named_;
+  std::int64_t count_ = 0, more_ = 0;
+};
+
+// Records images without features as failures of the run, with their reasons, and names those with hardly any.
 void list_unreadable(const Stage& stage, const Job& job, JobRecord& record, const FeatureStage& outcome) {
+  const int most = job.settings.features.max_features;
+  const bool few_are_asked = most > 0 && static_cast<std::size_t>(most) < kFewKeypoints;
   const std::string text = on_first_rank(job.ranks, [&] {
     nlohmann::json failed = nlohmann::json::array();
+    PoorImages poor;
     for (const std::string& shard : outcome.shards)
-      for (const ImageFeatures& image : read_keypoints(job.store.verified_path(shard)))
-        if (!image.failure.empty()) failed.push_back({job.block.name_of(image.image), image.failure});
-    return failed.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+      for (const ImageFeatures& image : read_keypoints(job.store.verified_path(shard))) {
+        const std::string name = job.block.name_of(image.image);
+        if (!image.failure.empty())
+          failed.push_back({name, image.failure});
+        else if (!few_are_asked)
+          poor.add(name, image);
+      }
+    return nlohmann::json{{"failed", failed}, {"poor", poor.text(job.block.images.size())}}.dump(
+        -1, ' ', false, nlohmann::json::error_handler_t::replace);
   });
+  const nlohmann::json found = nlohmann::json::parse(text);
   std::vector<FailedUnit> failures;
-  for (const auto& entry : nlohmann::json::parse(text)) failures.push_back({stage.name, entry[0], entry[1]});
+  for (const auto& entry : found["failed"]) failures.push_back({stage.name, entry[0], entry[1]});
   add_failures(job, record, failures);
+  if (const std::string poor = found["poor"]; !poor.empty()) add_note(job, record, stage.name, poor);
 }
 
 }  // namespace

@@ -15,10 +15,11 @@ constexpr std::int64_t kDescriptorSize = 128;
 
 void put_images(Hdf5Writer& file, const std::vector<ImageFeatures>& images) {
   std::vector<std::int32_t> size, counts;
-  std::vector<float> global;
+  std::vector<float> global, range;
   for (const ImageFeatures& features : images) {
     size.insert(size.end(), {features.width, features.height});
     counts.push_back(static_cast<std::int32_t>(features.keypoints.size()));
+    range.insert(range.end(), features.grey_range.begin(), features.grey_range.end());
     global.insert(global.end(), features.global_descriptor.begin(), features.global_descriptor.end());
   }
   file.group("images", "one row per image of the shard");
@@ -26,6 +27,8 @@ void put_images(Hdf5Writer& file, const std::vector<ImageFeatures>& images) {
               {"", "image index in the block"});
   file.matrix("images/size", size, 2, {"px", "width, height of the decoded image; 0: it failed"});
   file.vector("images/keypoints", counts, {"", "number of rows of the group 'keypoints', in the order of the images"});
+  file.matrix("images/grey_range", range, 2,
+              {"", "grey values of the file that all but a thousandth of its pixels keep to on either side"});
   file.matrix("images/global_descriptor", global, kDescriptorSize, {"", "unit norm"});
   file.texts("images/failure", column(images, [](const ImageFeatures& f) { return f.failure; }),
              {"", "why the image has no features; empty when it has"});
@@ -69,6 +72,7 @@ std::vector<ImageFeatures> read_keypoints(const std::string& path) {
   const auto count = static_cast<std::int64_t>(index.size());
   const auto size = file.matrix<std::int32_t>("images/size", 2, count);
   const auto global = file.matrix<float>("images/global_descriptor", kDescriptorSize, count);
+  const auto range = file.matrix<float>("images/grey_range", 2, count);
   const std::vector<std::string> failures = file.texts("images/failure", count);
   const auto scale = file.vector<float>("keypoints/scale");
   const auto rows = static_cast<std::int64_t>(scale.size());
@@ -81,6 +85,7 @@ std::vector<ImageFeatures> read_keypoints(const std::string& path) {
     images[i].width = size[2 * i];
     images[i].height = size[2 * i + 1];
     std::copy_n(&global[kDescriptorSize * i], kDescriptorSize, images[i].global_descriptor.begin());
+    images[i].grey_range = {range[2 * i], range[2 * i + 1]};
     images[i].failure = failures[i];
     for (auto k = static_cast<std::size_t>(begin[i]); k < static_cast<std::size_t>(begin[i + 1]); ++k)
       images[i].keypoints.push_back({position[2 * k], position[2 * k + 1], scale[k], angle[k]});

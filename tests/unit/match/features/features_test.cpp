@@ -235,6 +235,51 @@ TEST_F(Features, SixteenBitImagesAreStretched) {
   EXPECT_GT(detect(write("wide.tif", wide)).keypoints.size(), 100u);
 }
 
+// A pixel that is always bright leaves the features of all others where they are.
+TEST_F(Features, HotPixelsChangeNothing) {
+  cv::Mat wide;
+  noise_texture(300, 300, 50, 8).convertTo(wide, CV_16U, 8);  // 11 bits
+  const ImageFeatures plain = detect(write("plain.tif", wide));
+  for (int i = 0; i < 20; ++i) wide.at<std::uint16_t>(7 + i, 11 + 13 * i) = i % 3 == 0 ? 0 : 65535;
+  const ImageFeatures hot = detect(write("hot.tif", wide));
+  // Twenty of the ninety pixels beyond the range have changed: a step or two of the eight values between greys.
+  EXPECT_NEAR(plain.grey_range[0], hot.grey_range[0], 16);
+  EXPECT_NEAR(plain.grey_range[1], hot.grey_range[1], 16);
+  std::size_t found = 0;
+  for (const Keypoint& a : plain.keypoints)
+    found += std::ranges::any_of(hot.keypoints, [&](const Keypoint& b) {
+      return std::abs(a.x - b.x) < 512 && std::abs(a.y - b.y) < 512 && std::abs(a.scale_px / b.scale_px - 1) < 0.1;
+    });
+  EXPECT_GT(found, plain.keypoints.size() * 9 / 10);
+}
+
+TEST_F(Features, TheRangeOfGreyValuesLeavesAThousandthOut) {
+  cv::Mat ramp(100, 100, CV_16U);
+  for (int i = 0; i < 10000; ++i) ramp.at<std::uint16_t>(i / 100, i % 100) = static_cast<std::uint16_t>(3 * i);
+  const auto range = [&](const std::string& name, const cv::Mat& image) {
+    return detect(write(name, image)).grey_range;
+  };
+  EXPECT_EQ(range("ramp.tif", ramp), (std::array<float, 2>{30, 29967}));  // ten pixels darker, ten brighter
+  cv::Mat floats;
+  ramp.convertTo(floats, CV_32F);
+  floats.at<float>(50, 50) = std::numeric_limits<float>::infinity();
+  const auto of_floats = range("ramp_32.tif", floats);
+  EXPECT_NEAR(of_floats[0], 30, 3);
+  EXPECT_NEAR(of_floats[1], 29967, 3);
+  EXPECT_EQ(range("grey.png", cv::Mat(100, 100, CV_8U, cv::Scalar(90))), (std::array<float, 2>{90, 90}));
+}
+
+TEST_F(Features, AMaskOfSixteenBitsMasksWhereItIsNought) {
+  const cv::Mat texture = noise_texture(200, 200, 50, 8);
+  cv::Mat mask(200, 200, CV_16U, cv::Scalar(1));
+  mask.colRange(0, 100).setTo(0);
+  mask.at<std::uint16_t>(5, 150) = 65535;
+  const ImageFeatures features =
+      detect_features(write("texture.png", texture), write("mask.png", mask), ImageIndex(0), {});
+  EXPECT_GT(features.keypoints.size(), 30u);
+  for (const Keypoint& k : features.keypoints) EXPECT_GE(k.x, 100 * 1024);
+}
+
 TEST_F(Features, AnImageWithoutTextureHasNoneAndDoesNotFail) {
   const ImageFeatures features = detect(write("flat.png", cv::Mat(100, 100, CV_8U, cv::Scalar(90))));
   EXPECT_EQ(features.failure, "");
