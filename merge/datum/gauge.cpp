@@ -34,7 +34,8 @@ using Vector7 = Eigen::Matrix<double, 7, 1>;
 constexpr double kNullDirection = 1e-11;  // share of the largest eigenvalue; the matrix itself has errors of 1e-15
 constexpr double kHeldDirection = 1e-6;   // share of the largest singular value: a frame holds the directions above it
 constexpr double kOnePlace = 1e-9;  // share of the coordinates: frames within a smaller extent are all at one place
-constexpr double kDetermined = 1;   // information of a rotation (1 / rad^2) or of a scale, below which it is free
+// Information of a rotation (1 / rad^2) or of a scale, below which it is free; the second where it was held before.
+constexpr double kDetermined = 1, kReleased = 16;
 
 // All parts of one component.
 struct PartGroup {
@@ -62,11 +63,12 @@ struct Freedom {
   double scale_information = 0;
   double limit = 0;  // below, the information of a direction is rounding
   bool has_scale = false;
+  std::int32_t turns_against_priors = 0;  // free rotations with information that is not rounding
 };
 
 // Shifts are free in the null space. Rotations are free where their information is less than 1 / rad^2, with the shifts
-// estimated along with them.
-Freedom freedom_of(const Matrix77& normal) {
+// estimated along with them, and the `turns_before` least known ones where it is less than 16.
+Freedom freedom_of(const Matrix77& normal, std::int32_t turns_before) {
   Freedom freedom;
   freedom.limit = kNullDirection * symmetric_eigen(normal).values(6);
   const SymmetricEigen shift = symmetric_eigen(normal.block<3, 3>(3, 3));
@@ -88,10 +90,13 @@ Freedom freedom_of(const Matrix77& normal) {
   std::int64_t free_turns = 0;
   Eigen::Vector3d turned = Eigen::Vector3d::Zero();  // the rotation that follows from a scale of one
   for (int i = 0; i < 3; ++i) {
-    if (turn.values(i) <= std::max(freedom.limit, kDetermined))
+    const double determined = freedom.turns_against_priors < turns_before ? kReleased : kDetermined;
+    if (turn.values(i) <= std::max(freedom.limit, determined)) {  // the values ascend
       ++free_turns;
-    else
+      freedom.turns_against_priors += turn.values(i) > freedom.limit;
+    } else {
       turned -= turn.vectors.col(i) * turn.vectors.col(i).dot(both) / turn.values(i);
+    }
   }
   // A free rotation takes along the shift that follows from it.
   freedom.directions = Eigen::MatrixXd::Zero(7, free_shifts + free_turns);
@@ -116,7 +121,7 @@ Matrix77 movable_directions(const Matrix77& held) {
 }
 
 // Sets up a component, and finds the free directions of it alone.
-BlockComponent component_of(const PartGroup& group, Freedom& freedom) {
+BlockComponent component_of(const PartGroup& group, std::int32_t turns_before, Freedom& freedom) {
   BlockComponent c;
   c.lowest_frame = group.lowest_frame;
   // The sums go in the order of the tiles.
@@ -140,7 +145,8 @@ BlockComponent component_of(const PartGroup& group, Freedom& freedom) {
   c.pivot = c.centre;
   // The held positions give sum L^2 I as the block of t and sum L (X - c) as the column of t and s.
   if (held(3, 3) > 0) c.pivot += c.extent * held.block<3, 1>(3, 6) / held(3, 3);
-  freedom = freedom_of(normal);
+  freedom = freedom_of(normal, turns_before);
+  c.against_priors.rotations = freedom.turns_against_priors;
   // A scale moves no frame where all frames are at one place: a single frame that is known by its position only, for
   // example.
   freedom.has_scale = !one_place;
@@ -167,9 +173,9 @@ std::vector<std::size_t> scale_groups(const std::vector<PartGroup>& components) 
 // Numbers the free directions. A common scale is numbered in the first component with frames that it moves; the others
 // take over its number.
 void number_columns(const std::vector<std::size_t>& scale_group, const std::vector<Freedom>& freedoms,
-                    std::vector<BlockComponent>& components) {
+                    double determined, std::vector<BlockComponent>& components) {
   struct Scale {
-    double information = 0, limit = kDetermined;
+    double information = 0, rounding = 0, limit = 0;
     std::int64_t component = -1, column = -1;
     bool free() const { return component >= 0 && information <= limit; }
   };
@@ -178,7 +184,8 @@ void number_columns(const std::vector<std::size_t>& scale_group, const std::vect
   for (std::size_t c = 0; c < components.size(); ++c) {
     Scale& scale = scales[scale_group[c]];
     scale.information += freedoms[c].scale_information;
-    scale.limit = std::max(scale.limit, freedoms[c].limit);
+    scale.rounding = std::max(scale.rounding, freedoms[c].limit);
+    scale.limit = std::max(determined, scale.rounding);
     if (freedoms[c].has_scale && scale.component < 0) scale.component = static_cast<std::int64_t>(c);
   }
   std::int64_t column = 0;
@@ -200,6 +207,7 @@ void number_columns(const std::vector<std::size_t>& scale_group, const std::vect
     if (!scale.free()) continue;
     components[c].directions.col(std::ssize(components[c].columns)) = freedoms[c].scaling;
     components[c].columns.push_back(scale.column);
+    components[c].against_priors.scale = scale.information > scale.rounding;
   }
 }
 
@@ -221,6 +229,7 @@ void hold_frames(const PartGroup& group, const BlockComponent& c, std::vector<Ga
     if (rank > 0 && largest > 0) {
       GaugeConstraint constraint;
       constraint.frame = frame;
+      if (c.against_priors.any()) constraint.weight = kFirmly;
       constraint.count = rank;
       constraint.directions.leftCols(rank) = moves * svd.v.leftCols(rank);
       constraints.push_back(constraint);
@@ -270,7 +279,16 @@ std::int64_t BlockGauge::defect() const {
   return sum;
 }
 
-BlockGauge make_gauge(const std::vector<TileGauge>& tiles) {
+HeldAgainstPriors BlockGauge::against_priors() const {
+  HeldAgainstPriors all;
+  for (const BlockComponent& c : components) {
+    all.rotations = std::max(all.rotations, c.against_priors.rotations);
+    all.scale |= c.against_priors.scale;
+  }
+  return all;
+}
+
+BlockGauge make_gauge(const std::vector<TileGauge>& tiles, const HeldAgainstPriors& held_before) {
   // Parts of different tiles belong to one component where they share a frame.
   std::vector<std::pair<std::size_t, std::size_t>> all;  // (tile, part)
   for (std::size_t t = 0; t < tiles.size(); ++t)
@@ -299,8 +317,9 @@ BlockGauge make_gauge(const std::vector<TileGauge>& tiles) {
     if (!groups[g].parts.empty()) component_of_group[g] = std::exchange(components, components + 1);
   std::erase_if(groups, [](const PartGroup& group) { return group.parts.empty(); });
   std::vector<Freedom> freedoms(groups.size());
-  for (std::size_t c = 0; c < groups.size(); ++c) gauge.components.push_back(component_of(groups[c], freedoms[c]));
-  number_columns(scale_groups(groups), freedoms, gauge.components);
+  for (std::size_t c = 0; c < groups.size(); ++c)
+    gauge.components.push_back(component_of(groups[c], held_before.rotations, freedoms[c]));
+  number_columns(scale_groups(groups), freedoms, held_before.scale ? kReleased : kDetermined, gauge.components);
   for (std::size_t c = 0; c < groups.size(); ++c)
     if (gauge.components[c].defect > 0) hold_frames(groups[c], gauge.components[c], gauge.constraints);
   for (const TileGauge& tile : tiles) gauge.part_component.emplace_back(tile.parts.size(), 0);
@@ -326,7 +345,7 @@ TileDatum tile_datum(const BlockGauge& gauge, std::int64_t tile, const TileProbl
   if (!gauge.free()) return datum;
   for (const GaugeConstraint& c : gauge.constraints) {
     const UnknownId id{UnknownKind::kFrame, 0, c.frame};
-    if (find_unknown(plan.owned, id) >= 0) datum.holds.push_back({id, c.directions.leftCols(c.count)});
+    if (find_unknown(plan.owned, id) >= 0) datum.holds.push_back({id, c.directions.leftCols(c.count), c.weight});
   }
   if (!with_columns) return datum;
   const auto components = free_component_of_frame(gauge, tile, plan);

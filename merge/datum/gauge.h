@@ -6,7 +6,9 @@
 // without priors, 6 with held rigs, 1 for positions on one straight line, 4 with attitudes only. A rotation also counts
 // as free when the priors give it no better than to a radian, and a scale when they give it no better than to a factor
 // (positions that are within their own noise of a straight line): the linearised system says nothing of such
-// directions.
+// directions. A block that has held as many rotations, or a scale, goes on to hold them until the priors give them to a
+// quarter of that. Otherwise a direction near the limit would be held and released in turns, and the iterations would
+// not end.
 //
 // The free directions belong to a connected component of the block, and are found before every sweep up. Pivots that
 // vanish in spite of the datum (front.h) are unknowns that too few observations determine; they are reported as such.
@@ -22,8 +24,10 @@
 //     (H + B'B)^-1 b is a solution x of H x = b with B x = 0,    b'(H + B'B)^-1 b = b'x,
 //
 // whatever the weight. The constraints thus move no adjusted observation and leave the decrement unchanged. They couple
-// no unknowns, make no dense rows and add nothing to the gradient. A rotation that priors give, but no better than to a
-// radian, is held in the same way, although for it H N is not quite zero.
+// no unknowns, make no dense rows and add nothing to the gradient. A rotation or a scale that priors give, but hardly,
+// is held in the same way, although for it neither H N nor N'b is quite zero. The constraint must then bear the pull of
+// the priors. B'B has the weight kFirmly in such a component, because of the pull (N'b)^2 over this weight stays in the
+// decrement.
 #pragma once
 
 #include <Eigen/Core>
@@ -60,6 +64,9 @@ struct TileGauge {
 // Needs all tables of the tile, also those that may lie in scratch (tile_store.h).
 TileGauge tile_gauge(const TileProblem& problem, const TilePlan& plan, const TileState& state);
 
+// The weight of constraints that hold a direction against priors. The other directions of the frame lose six digits.
+inline constexpr double kFirmly = 1e6;
+
 // A connected component of the block.
 struct BlockComponent {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -71,6 +78,7 @@ struct BlockComponent {
   std::vector<std::int64_t> columns;
   Matrix77 directions = Matrix77::Zero();  // first of its columns: the free combinations of (phi, t, s)
   std::int64_t defect = 0;  // its share of the block's defect: a common scale counts in one component only
+  HeldAgainstPriors against_priors;
   // The projection on the combinations that move no held position. A step may move the component along them as a whole
   // (block_motion.h).
   Matrix77 movable = Matrix77::Identity();
@@ -90,6 +98,7 @@ struct BlockComponent {
 struct GaugeConstraint {
   std::int64_t frame = -1;
   std::int64_t count = 0;
+  double weight = 1;  // of B'B
   Matrix67 directions = Matrix67::Zero();
 };
 
@@ -99,10 +108,11 @@ struct BlockGauge {
   std::vector<std::vector<std::int64_t>> part_component;  // [tiles][parts] row of components
   std::int64_t defect() const;  // sum over the components = number of further right-hand sides
   bool free() const { return defect() > 0; }
+  HeldAgainstPriors against_priors() const;  // of all components
 };
 // Finds the datum of the block from all tiles, in tile order. The result has the same bits on every rank, as it depends
-// on the gathered parts alone.
-BlockGauge make_gauge(const std::vector<TileGauge>& tiles);
+// on the gathered parts alone. `held_before`: by earlier data of the block.
+BlockGauge make_gauge(const std::vector<TileGauge>& tiles, const HeldAgainstPriors& held_before = {});
 
 // The component of every frame row of a tile; nullptr: the row is untouched, or the datum of its component is complete.
 std::vector<const BlockComponent*> free_component_of_frame(const BlockGauge& gauge, std::int64_t tile,

@@ -49,11 +49,11 @@ void add_datum(const TileDatum& datum, const UnknownList& unknowns, Front& front
           Eigen::Map<const Eigen::Matrix<double, 6, 1>>(front.diagonal() + row).unaryExpr([](double d) {
             return d > 0 ? std::sqrt(d) : 1;
           });
-      // B'B = D^1/2 Q Q'D^1/2 (gauge.h).
+      // B'B = weight D^1/2 Q Q'D^1/2 (gauge.h).
       const Eigen::MatrixXd scaled = root.asDiagonal() * hold.directions;
       const Eigen::MatrixXd basis = orthonormal_basis(scaled);
       const Eigen::MatrixXd weight = root.asDiagonal() * (basis * basis.transpose()) * root.asDiagonal();
-      add_block(front, row, row, weight);
+      add_block(front, row, row, hold.weight * weight);
     }
   }
 }

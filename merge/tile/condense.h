@@ -47,17 +47,27 @@ struct TileDatum {
   struct Hold {
     UnknownId frame;
     Eigen::Matrix<double, 6, Eigen::Dynamic> directions;  // along which the frame is held
+    double weight = 1;
   };
   std::vector<Hold> holds;
   Step columns{{}, 0, {}};  // further right-hand sides
+};
+
+// The directions that a block holds although priors determine them, but hardly.
+struct HeldAgainstPriors {
+  std::int32_t rotations = 0;  // of the component with most
+  bool scale = false;
+  bool any() const { return rotations > 0 || scale; }
 };
 
 // The linearisation and the damping of a sweep. A plain number stands for a sweep with this lambda and without
 // curvature.
 struct Sweep {
   double lambda = 0;
-  bool curvature = false;  // with the second-order term of the robust losses
-  Sweep(double damping, bool with_curvature = false) : lambda(damping), curvature(with_curvature) {}
+  bool curvature = false;         // with the second-order term of the robust losses
+  HeldAgainstPriors held_before;  // by earlier sweeps (gauge.h)
+  Sweep(double damping, bool with_curvature = false, const HeldAgainstPriors& held = {})
+      : lambda(damping), curvature(with_curvature), held_before(held) {}
 };
 
 // Linearises at `state`, and eliminates the points and inner unknowns of the tile. Throws ComputeError when a kept

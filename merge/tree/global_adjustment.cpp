@@ -78,6 +78,7 @@ GlobalState start_global(const GlobalOptions& options) {
 }
 
 void report_up(GlobalState& state, const GlobalOptions& options, const UpReport& report) {
+  state.held = std::max(state.held % 4, report.held.rotations) + (state.held >= 4 || report.held.scale ? 4 : 0);
   state.cost = report.sums.cost;
   state.decrement_squared = report.sums.decrement_squared;
   if (state.initial_cost < 0) state.initial_cost = state.cost;

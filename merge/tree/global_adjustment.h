@@ -53,6 +53,7 @@ struct GlobalOptions {
 // The result of a sweep up: the sums at the root.
 struct UpReport {
   SubtreeSums sums;
+  HeldAgainstPriors held{};
 };
 
 // The result of a sweep down and of the evaluation of the trial state, summed over the tiles in their order.
@@ -93,11 +94,15 @@ struct GlobalState {
   std::int32_t curvature = 0;
   std::int32_t sweep_curvature = 0;  // of the current sweep; 0 for a confirming sweep
   std::int32_t confirm = 1;          // 0: a confirming sweep failed at the current state and its step was rejected
+  // What sweeps have held against priors: the number of rotations, and 4 where a scale was held.
+  std::int32_t held = 0;
 };
 
 GlobalState start_global(const GlobalOptions& options);
 inline GlobalAction next_action(const GlobalState& state) { return state.next; }
-inline Sweep next_sweep(const GlobalState& state) { return {state.sweep_lambda, state.sweep_curvature != 0}; }
+inline Sweep next_sweep(const GlobalState& state) {
+  return {state.sweep_lambda, state.sweep_curvature != 0, {state.held % 4, state.held >= 4}};
+}
 void report_up(GlobalState& state, const GlobalOptions& options, const UpReport& report);
 void report_down(GlobalState& state, const GlobalOptions& options, const DownReport& report);
 void report_accepted(GlobalState& state, const GlobalOptions& options);

@@ -84,7 +84,7 @@ void MergeTreeRunner::find_gauges() {
 }
 
 BlockGauge MergeTreeRunner::gather_gauge() const {
-  return make_gauge(gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, gauges_));
+  return make_gauge(gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, gauges_), held_before_);
 }
 
 TileDatum MergeTreeRunner::datum_of(std::size_t row) const {

@@ -173,7 +173,8 @@ class MergeTreeRunner : public TreeRunner {
   std::vector<std::int64_t>
       sent_subtrees_;  // recorded subtrees of this sweep whose update has left this rank's own subtrees
   BlockGauge gauge_;
-  bool with_columns_ = false;  // the sweep has the further right-hand sides of a free datum
+  HeldAgainstPriors held_before_;  // of the last sweep up
+  bool with_columns_ = false;      // the sweep has the further right-hand sides of a free datum
   bool check_seams_ = false;
   bool posterior_expected_ = false;
   std::optional<SubtreeSums> last_sweep_;  // sums of a sweep at the present state that stored the data of the posterior

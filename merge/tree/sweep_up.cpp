@@ -103,12 +103,14 @@ UpReport MergeTreeRunner::up(const Sweep& sweep) {
   const Stopwatch watch(seconds_.all);
   ++seconds_.sweeps_up;
   // The datum belongs to the present state, not to the first one, so that a resumed run gets the same bits.
+  held_before_ = sweep.held_before;
   gauge_ = gather_gauge();
   last_sweep_.reset();
   // A sweep that may be the last one checks its seams at once. The condition on the curvature is that of the
   // covariances: their weights are rho' alone.
   check_seams_ = posterior_expected_ && sweep.lambda == 0 && !sweep.curvature && !gauge_.free();
-  const UpReport report = condense_all(sweep);
+  UpReport report = condense_all(sweep);
+  report.held = gauge_.against_priors();
   if (check_seams_) last_sweep_ = report.sums;
   check_seams_ = false;
   return report;

@@ -65,6 +65,18 @@ class EverydayInput(CopyOfTheBlock):
         self.assertIn("1 measurement is not used, because the block has no image 'IMG_9999.jpg'", said)
         self.assert_all_oriented()
 
+    def test_positions_without_heights_leave_the_tilt_and_end(self):
+        lines = ["EPSG:4326"]
+        for file in self.files():
+            latitude, longitude = pictures.Exif(file).position()
+            lines.append(f"{file.stem} {longitude:.9f} {latitude:.9f}")
+            pictures.strip_exif(file)
+        (self.folder / "geo.txt").write_text("\n".join(lines))
+        self.write_project("positions: geo.txt\ncameras: {default: {focal_px: 375}}\norigin: [48.85, 2.35, 100]\n")
+        self.run_job()
+        self.assert_all_oriented()
+        self.assertIn("heights and attitudes are not usable", " ".join(status(self.job)["remarks"]))
+
     def test_positions_of_a_file_do_as_those_of_the_headers(self):
         lines = ["EPSG:4326"]
         for file in self.files():

@@ -202,9 +202,10 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
     }
     position.round = changed ? position.round + 1 : most_rounds(job.settings.merge, position);
     position.tried_steps += position.global.iterations;
-    const std::int32_t accepted = position.global.accepted;
+    const std::int32_t accepted = position.global.accepted, held = position.global.held;
     position.global = start_global(options);
     position.global.accepted = accepted;
+    position.global.held = held;
     checkpoint.write(position, tiles, block);
   }
   adjusted.image_sigma_px = common_image_sigma(job, tiles);

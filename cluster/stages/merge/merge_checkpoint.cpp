@@ -47,7 +47,8 @@ static_assert(sizeof(MergePosition) == 120 + 8 * kObservationKinds && offsetof(M
               offsetof(MergePosition, global) == 8 && offsetof(MergePosition, scales) == 112 &&
               offsetof(MergePosition, rounds_afar) == 112 + 8 * kObservationKinds &&
               offsetof(GlobalState, lambda) == 8 && offsetof(GlobalState, decrement_squared) == 48 &&
-              offsetof(GlobalState, accepted) == 84 && offsetof(GlobalState, curvature) == 88);
+              offsetof(GlobalState, accepted) == 84 && offsetof(GlobalState, curvature) == 88 &&
+              offsetof(GlobalState, held) == 100);
 
 void write_marker(const std::string& path, const MergePosition& position) {
   std::ofstream out(path, std::ios::binary);
