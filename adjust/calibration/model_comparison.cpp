@@ -30,7 +30,7 @@ namespace {
 constexpr int kAllTerms = -1;
 
 ModelCandidate candidate_of(const CameraModel& model, int terms) {
-  ModelCandidate candidate{model, free_parameters(model), model_name(model)};
+  ModelCandidate candidate{model, usual_parameters(model), model_name(model)};
   if (terms == kAllTerms) return candidate;
   candidate.name += "/" + std::to_string(terms);
   // All but the first `terms` radial terms are held, and so is decentring: the candidates are to grow by one thing at a

@@ -223,9 +223,7 @@ class Calibration {
 };
 
 // A shift of the principal point of some models is nothing but a rotation of the camera, which is an unknown already.
-ParameterMask estimated(const Intrinsics& start, ParameterMask held) {
-  return free_parameters(start.model()) & ~held & ~parameters_like_rotation(start.model());
-}
+ParameterMask estimated(const Intrinsics& start, ParameterMask held) { return usual_parameters(start.model()) & ~held; }
 
 ParameterMask leading(const CameraModel& model, ParameterMask free) {
   ParameterMask mask = 0;

@@ -12,7 +12,7 @@ constexpr std::int64_t padded(std::int64_t count) { return (count + kGroup - 1) 
 
 // How many doubles describe the image and the observation of a lane. Both are multiples of kGroup: the kernels read
 // them by vectors of any width and transpose these into lanes.
-constexpr int kViewSize = 24;   // rotation by rows [9], centre [3], shift [3], Brown's parameters [8], unused
+constexpr int kViewSize = 32;   // rotation by rows [9], centre [3], shift [3], Brown's parameters [10], unused
 constexpr int kRecordSize = 8;  // point [3], measured x and y [2], inverse sigma, unused [2]
 
 // Value v of lane i: values[v * stride + i].

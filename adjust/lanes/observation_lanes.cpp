@@ -39,7 +39,7 @@ LaneView::LaneView(const ImageView& view) {
     for (int j = 0; j < 3; ++j) *out++ = view.rotation(i, j);
   out = std::copy_n(view.centre.data(), 3, out);
   out = std::copy_n(view.shift.data(), 3, out);
-  if (simple) std::copy_n(k.data(), kDecentring2 + 1, out);
+  if (simple) std::copy_n(k.data(), BrownModel::parameter_count(0), out);
 }
 
 SeenImages::SeenImages(const TileProblem& problem, const TileState& state)

@@ -221,7 +221,10 @@ void add_export(CLI::App& app, Action& action) {
       check_parent(options->output);
       const std::vector<std::string> inputs = inputs_of(options->job);
       for (const std::string& file : export_files(options->format, options->output)) check_output(file, inputs);
-      export_result(read_result(finished_result(options->job)), options->format, options->output);
+      const BlockResult result = read_result(finished_result(options->job));
+      export_result(result, options->format, options->output);
+      if (const std::string note = export_note(result, options->format); !note.empty())
+        std::printf("Note: %s.\n", note.c_str());
       return kExitDone;
     };
   });

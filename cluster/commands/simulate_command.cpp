@@ -162,6 +162,9 @@ void add_observation_options(SimulateOptions& s) {
         "Aerial, street, panorama: true camera of the published simulations, 1 to 4, with its size", kAnyCamera);
   s.add("--start-focal", &O::start_focal,
         "Aerial, street, panorama: focal length that the block starts from, over the nominal one [1]", kAnyCamera);
+  s.add("--affinity", &O::affinity,
+        "Aerial, street, panorama: largest affinity and skew of the true camera, share of the focal length [0]",
+        kAnyCamera);
   s.add_switch("--no-distortion", &O::distortion, "A camera without lens distortion");
   s.add_switch("--known-cameras", &O::free_cameras,
                "Stereopolis, target field: cameras are known and held at the truth, mounts are not", kVehicle);

@@ -1,5 +1,6 @@
 #include "geometry/camera/intrinsics.h"
 
+#include <algorithm>
 #include <numbers>
 
 namespace megablock {
@@ -23,7 +24,7 @@ double inverse_power(double focal, int degree) {
 }
 
 double weak_sigma(const CameraParameter& parameter, double focal, double focal_sigma, int width) {
-  if (parameter.fixed || parameter.same_as_rotation) return 0;
+  if (parameter.fixed) return 0;
   switch (parameter.role) {
     case ParameterRole::kFocal:
       return focal_sigma;
@@ -35,6 +36,8 @@ double weak_sigma(const CameraParameter& parameter, double focal, double focal_s
       return parameter.unit == ParameterUnit::kInversePixels ? 0.2 * inverse_power(focal, parameter.degree) : 0.2;
     case ParameterRole::kTangential:
       return 0.01;
+    case ParameterRole::kAffinity:
+      return 0.01 * focal;
     case ParameterRole::kAdditive:
       return 0.01 * width;
     case ParameterRole::kImageSize:
@@ -53,8 +56,16 @@ ParameterMask parameters_with(const CameraModel& model, ParameterRole role) {
   return select(model, [&](const CameraParameter& parameter) { return parameter.role == role; });
 }
 
-ParameterMask parameters_like_rotation(const CameraModel& model) {
-  return select(model, [](const CameraParameter& parameter) { return parameter.same_as_rotation; });
+ParameterMask usual_parameters(const CameraModel& model) {
+  return select(model, [](const CameraParameter& parameter) {
+    return !parameter.fixed && !parameter.same_as_rotation && !parameter.rare;
+  });
+}
+
+int count_without_rare(const CameraModel& model) {
+  const auto rare = [](const CameraParameter& parameter) { return parameter.rare; };
+  const std::vector<CameraParameter>& all = camera_parameters(model);
+  return static_cast<int>(std::find_if(all.begin(), all.end(), rare) - all.begin());
 }
 
 ParameterMask radial_terms(const CameraModel& model, int terms) {
@@ -92,12 +103,17 @@ void set_principal_point(double x_px, double y_px, Intrinsics& k) {
   k[kSymmetryY] = y_px;
 }
 
-IntrinsicSigmas weak_sigmas(const Intrinsics& start, double focal_sigma_px, int width) {
+IntrinsicSigmas weak_sigmas(const Intrinsics& start, double focal_sigma_px, int width, ParameterMask which) {
   IntrinsicSigmas sigma{};
   const std::vector<CameraParameter>& parameters = camera_parameters(start.model());
   for (std::size_t p = 0; p < parameters.size(); ++p)
-    sigma[p] = weak_sigma(parameters[p], start[kFocal], focal_sigma_px, width);
+    if (contains(which, static_cast<int>(p)))
+      sigma[p] = weak_sigma(parameters[p], start[kFocal], focal_sigma_px, width);
   return sigma;
+}
+
+IntrinsicSigmas weak_sigmas(const Intrinsics& start, double focal_sigma_px, int width) {
+  return weak_sigmas(start, focal_sigma_px, width, usual_parameters(start.model()));
 }
 
 }  // namespace megablock

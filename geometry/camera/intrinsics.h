@@ -21,8 +21,11 @@ constexpr int count_of(ParameterMask mask) { return __builtin_popcountll(mask); 
 ParameterMask free_parameters(const CameraModel& model);
 // The parameters with this role.
 ParameterMask parameters_with(const CameraModel& model, ParameterRole role);
-// The parameters that a rotation of the camera can replace.
-ParameterMask parameters_like_rotation(const CameraModel& model);
+// The parameters that are estimated unless more is asked for: not those that are fixed, that a rotation of the camera
+// can replace, or that are rare.
+ParameterMask usual_parameters(const CameraModel& model);
+// The number of leading parameters that every camera of the model has; rare ones come after them.
+int count_without_rare(const CameraModel& model);
 // The first `terms` radial terms; none in models without radial terms.
 ParameterMask radial_terms(const CameraModel& model, int terms);
 
@@ -39,7 +42,8 @@ class Intrinsics {
   constexpr Intrinsics(const CameraModel& model, std::initializer_list<double> values) : model_(model) {
     std::copy(values.begin(), values.end(), values_.begin());
   }
-  // Parameters of Brown's model: f, cx, cy, k1, k2, k3, p1, p2.
+  // Parameters of Brown's model: f, cx, cy, k1, k2, k3, p1, p2, b1, b2. The last ones may be left out and are zero
+  // then.
   constexpr Intrinsics(std::initializer_list<double> brown) : Intrinsics(CameraModel(), brown) {}
 
   constexpr const CameraModel& model() const { return model_; }
@@ -70,8 +74,10 @@ Intrinsics start_intrinsics(const CameraModel& model, double focal_px, int width
 void set_principal_point(double x_px, double y_px, Intrinsics& k);
 
 // Prior standard deviations that keep the self-calibration of small blocks stable: the given one for the focal length
-// (pixels), for the others what ParameterRole says, in the unit of the parameter. Fixed parameters have 0, and so have
-// those that a rotation of the camera can replace.
+// (pixels), for the others what ParameterRole says, in the unit of the parameter. Parameters outside of `which` have 0,
+// and so have fixed ones.
+IntrinsicSigmas weak_sigmas(const Intrinsics& start, double focal_sigma_px, int width, ParameterMask which);
+// The same for usual_parameters().
 IntrinsicSigmas weak_sigmas(const Intrinsics& start, double focal_sigma_px, int width);
 
 }  // namespace megablock

@@ -1,5 +1,8 @@
 #include "io/exchange/export.h"
 
+#include <fmt/core.h>
+
+#include <cmath>
 #include <filesystem>
 
 #include "io/base/file_error.h"
@@ -47,6 +50,32 @@ std::vector<std::string> export_files(const std::string& format, const std::stri
   if (files.empty()) files.push_back(out);
   if (format == "bundler") files.push_back(out + ".list.txt");
   return files;
+}
+
+std::string export_note(const BlockResult& result, const std::string& format) {
+  const bool colmap = format.starts_with("colmap"), bal = format == "bal" || format == "bundler";
+  std::string worst;
+  double most = 0;
+  for (std::size_t c = 0; (colmap || bal) && c < result.block.cameras.size(); ++c) {
+    const CameraIndex index(static_cast<std::int64_t>(c));
+    const Camera& camera = result.block.cameras[index];
+    const Intrinsics& k = result.state.cameras[index];
+    const auto affinity = find_parameter(k.model(), "b1"), skew = find_parameter(k.model(), "b2");
+    if (!affinity || !skew) continue;
+    // At the corners (f + b1) x' + b2 y' differs from f x' by this.
+    const double lost = ((bal ? std::abs(k[static_cast<std::size_t>(*affinity)]) * camera.width : 0) +
+                         std::abs(k[static_cast<std::size_t>(*skew)]) * camera.height) /
+                        (2 * k[kFocal]);
+    if (lost <= most) continue;
+    most = lost;
+    worst = camera.name;
+  }
+  if (most == 0) return "";
+  return fmt::format(
+      "{} files have no {} of the pixels: the observations are corrected for it, but the images of camera '{}' differ "
+      "from the exported camera by up to {:.2g} px in the corners; leave {} out of 'calibrate' if that is too much",
+      colmap ? "COLMAP" : "BAL and Bundler", colmap ? "skew (b2)" : "affinity and skew (b1, b2)", worst, most,
+      colmap ? "b2" : "b1 and b2");
 }
 
 void export_result(const BlockResult& result, const std::string& format, const std::string& out) {

@@ -20,6 +20,10 @@ const std::vector<std::string>& export_formats();
 // The files that a format writes for `out`. Some files of csv are written only if the block has contents for them.
 std::vector<std::string> export_files(const std::string& format, const std::string& out);
 
+// What the format cannot hold of the cameras, in a sentence; empty: nothing that matters. COLMAP has no skew, BAL and
+// Bundler have no affinity either: the observations are corrected for it, but images are not.
+std::string export_note(const BlockResult& result, const std::string& format);
+
 // Writes the export. If the format is a folder, the folder is made; its parent must exist. Throws InputError for an
 // unknown format, and if the export cannot be written.
 void export_result(const BlockResult& result, const std::string& format, const std::string& out);

@@ -13,13 +13,19 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// The parameters that a name in `calibrate: [...]` stands for: one parameter, or one of two groups.
+// The parameters that a name in `calibrate: [...]` stands for: one parameter, or one of three groups.
 std::vector<int> parameters_named(const Camera& camera, const std::string& name, const std::string& where) {
   const CameraModel& model = camera.intrinsics.model();
   if (name == "focal") return {kFocal};
   if (name == "principal_point") return {kPrincipalX, kPrincipalY};
   if (const auto parameter = find_parameter(model, name)) return {*parameter};
-  std::string list = "focal, principal_point";
+  if (name == "usual") {
+    std::vector<int> usual;
+    for (int p = 0; p < parameter_count(model); ++p)
+      if (contains(usual_parameters(model), p)) usual.push_back(p);
+    return usual;
+  }
+  std::string list = "usual, focal, principal_point";
   for (int p = 0; p < parameter_count(model); ++p) list += ", " + parameter_name(model, p);
   throw InputError(where + ": calibrate: '" + name + "' is not a parameter of camera '" + camera.name + "' (model " +
                    model_name(model) + "); its parameters are " + list);
@@ -27,17 +33,15 @@ std::vector<int> parameters_named(const Camera& camera, const std::string& name,
 
 void hold_except(const YAML::Node& list, const std::string& where, Camera& camera) {
   const CameraModel& model = camera.intrinsics.model();
-  IntrinsicSigmas sigma{};
+  ParameterMask asked = 0;
   for (const auto& item : list)
     for (const int p : parameters_named(camera, item.IsScalar() ? item.Scalar() : "", where)) {
       if (is_fixed(model, p))
         throw InputError(where + ": calibrate: '" + parameter_name(model, p) + "' of the model " + model_name(model) +
                          " follows from the size of the image and cannot be estimated; take it out of 'calibrate'");
-      // The cx of a panorama is held by default and has no sigma. If it is to be estimated, it gets the sigma of cy.
-      const int like = camera.prior_sigma[static_cast<std::size_t>(p)] > 0 ? p : static_cast<int>(kPrincipalY);
-      sigma[static_cast<std::size_t>(p)] = camera.prior_sigma[static_cast<std::size_t>(like)];
+      asked |= mask_of(p);
     }
-  camera.prior_sigma = sigma;
+  camera.prior_sigma = default_intrinsic_sigmas(camera, asked);
 }
 
 // Sets the camera model. The focal length and the principal point of the camera remain.

@@ -26,7 +26,8 @@ std::vector<InterpretationPlane> planes_of(const std::vector<ImageLine>& lines, 
 // plausible error of each parameter.
 Eigen::Matrix3Xd derivatives_by_camera(const std::vector<ImageLine>& lines, const Camera& camera,
                                        const Eigen::Vector3d& down) {
-  const IntrinsicSigmas weak = weak_sigmas(camera.intrinsics, 0.3 * camera.intrinsics[kFocal], camera.width);
+  const IntrinsicSigmas weak = weak_sigmas(camera.intrinsics, 0.3 * camera.intrinsics[kFocal], camera.width,
+                                           free_parameters(camera.intrinsics.model()));
   Eigen::Matrix3Xd result = Eigen::Matrix3Xd::Zero(3, camera.intrinsics.size());
   for (int p = 0; p < camera.intrinsics.size(); ++p) {
     const auto at = static_cast<std::size_t>(p);

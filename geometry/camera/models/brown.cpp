@@ -9,11 +9,15 @@ std::vector<CameraParameter> BrownModel::parameters(int) {
   add_radial_terms(3, all);
   all.push_back({"p1", ParameterRole::kTangential});
   all.push_back({"p2", ParameterRole::kTangential});
+  for (const char* name : {"b1", "b2"})
+    all.push_back({.name = name, .role = ParameterRole::kAffinity, .unit = ParameterUnit::kPixels, .rare = true});
   return all;
 }
 
 std::optional<Eigen::Vector2d> BrownModel::normalised(int, const double* k, const Eigen::Vector2d& pixel) {
-  const Eigen::Vector2d target = in_focal_lengths(k, pixel);
+  // (x', y'), which have the affinity no longer.
+  Eigen::Vector2d target(pixel.x() - k[kPrincipalX], (pixel.y() - k[kPrincipalY]) / k[kFocal]);
+  target.x() = (target.x() - k[kSkew] * target.y()) / (k[kFocal] + k[kAffinity]);
   Eigen::Vector2d p = target;
   constexpr int kMaxIterations = 50;
   for (int i = 0; i < kMaxIterations; ++i) {

@@ -1,9 +1,15 @@
 // Gives Brown's model of radial and decentring distortion (D. C. Brown, 1971), with OpenCV's order and signs of
-// parameters.
+// parameters, and affinity and skew of the pixels as Metashape and Fraser (1997, "Digital camera self-calibration")
+// have them.
 //
 //     x = X/Z, y = Y/Z,  r2 = x^2 + y^2,
-//     u = cx + f (x (1 + k1 r2 + k2 r2^2 + k3 r2^3) + 2 p1 x y + p2 (r2 + 2 x^2))
-//     v = cy + f (y (1 + k1 r2 + k2 r2^2 + k3 r2^3) + p1 (r2 + 2 y^2) + 2 p2 x y)
+//     x' = x (1 + k1 r2 + k2 r2^2 + k3 r2^3) + 2 p1 x y + p2 (r2 + 2 x^2)
+//     y' = y (1 + k1 r2 + k2 r2^2 + k3 r2^3) + p1 (r2 + 2 y^2) + 2 p2 x y
+//     u = cx + (f + b1) x' + b2 y'
+//     v = cy + f y'
+//
+// b1 and b2 are in pixels. A camera with two focal lengths has fx = f + b1 and fy = f. With b1 = b2 = 0 every operation
+// gives the bits of the formula without them.
 //
 // The derivatives are inline, because most blocks use this model and loops over many observations call them.
 #pragma once
@@ -27,7 +33,7 @@ struct BrownModel {
       ColmapModel{3, "RADIAL", "f cx cy k1 k2"},
   };
 
-  static constexpr int parameter_count(int) { return 8; }
+  static constexpr int parameter_count(int) { return 10; }
   static std::vector<CameraParameter> parameters(int);
 
   template <typename Scalar>
@@ -43,7 +49,7 @@ struct BrownModel {
   // positive.
   static std::optional<Eigen::Vector2d> normalised(int, const double* k, const Eigen::Vector2d& pixel);
 
-  // Distorted normalised coordinates, with their derivatives by the undistorted (x, y).
+  // Distorted normalised coordinates (x', y'), with their derivatives by the undistorted (x, y).
   struct Distortion {
     Eigen::Vector2d point;
     Eigen::Matrix2d jacobian;
@@ -59,7 +65,7 @@ PixelOf<Scalar> BrownModel::project(int, const Scalar* k, const PointOf<Scalar>&
   const Scalar two_xy = Scalar(2) * x * y;
   const Scalar xd = x * radial + k[kDecentring1] * two_xy + k[kDecentring2] * (r2 + Scalar(2) * x * x);
   const Scalar yd = y * radial + k[kDecentring1] * (r2 + Scalar(2) * y * y) + k[kDecentring2] * two_xy;
-  return {k[kPrincipalX] + k[kFocal] * xd, k[kPrincipalY] + k[kFocal] * yd};
+  return {k[kPrincipalX] + ((k[kFocal] + k[kAffinity]) * xd + k[kSkew] * yd), k[kPrincipalY] + k[kFocal] * yd};
 }
 
 inline BrownModel::Distortion BrownModel::distort(const double* k, double x, double y) {
@@ -81,18 +87,25 @@ inline bool BrownModel::linearise(const double* k, const Eigen::Vector3d& point,
   const double inverse_z = 1 / point.z();
   const double x = point.x() * inverse_z, y = point.y() * inverse_z;
   const Distortion d = distort(k, x, y);
-  const double f = k[kFocal];
-  result.pixel = {k[kPrincipalX] + f * d.point.x(), k[kPrincipalY] + f * d.point.y()};
-  result.by_point.leftCols<2>() = (f * inverse_z) * d.jacobian;
+  const double f = k[kFocal], fx = f + k[kAffinity], skew = k[kSkew];
+  result.pixel = {k[kPrincipalX] + (fx * d.point.x() + skew * d.point.y()), k[kPrincipalY] + f * d.point.y()};
+  result.by_point.row(0).head<2>() = (fx * inverse_z) * d.jacobian.row(0) + (skew * inverse_z) * d.jacobian.row(1);
+  result.by_point.row(1).head<2>() = (f * inverse_z) * d.jacobian.row(1);
   // x and y depend on Z only by the quotients, so dx/dZ = -x/Z.
   result.by_point.col(2) = -x * result.by_point.col(0) - y * result.by_point.col(1);
   if (!with_intrinsics) return true;
 
   const double r2 = x * x + y * y, r4 = r2 * r2, r6 = r4 * r2, xy = 2 * x * y;
-  result.by_intrinsics.resize(2, 8);
-  Eigen::Map<Eigen::Matrix<double, 2, 8>>(result.by_intrinsics.data()) << d.point.x(), 1, 0, f * x * r2, f * x * r4,
-      f * x * r6, f * xy, f * (r2 + 2 * x * x),  //
-      d.point.y(), 0, 1, f * y * r2, f * y * r4, f * y * r6, f * (r2 + 2 * y * y), f * xy;
+  result.by_intrinsics.resize(2, 10);
+  // Of the distorted (x', y'), by k1, k2, k3, p1, p2.
+  Eigen::Matrix<double, 2, 5> by_distortion;
+  by_distortion << x * r2, x * r4, x * r6, xy, r2 + 2 * x * x,  //
+      y * r2, y * r4, y * r6, r2 + 2 * y * y, xy;
+  Eigen::Map<Eigen::Matrix<double, 2, 10>> by_all(result.by_intrinsics.data());
+  by_all.leftCols<3>() << d.point.x(), 1, 0, d.point.y(), 0, 1;
+  by_all.row(0).segment<5>(kRadial1) = fx * by_distortion.row(0) + skew * by_distortion.row(1);
+  by_all.row(1).segment<5>(kRadial1) = f * by_distortion.row(1);
+  by_all.rightCols<2>() << d.point.x(), d.point.y(), 0, 0;
   return true;
 }
 

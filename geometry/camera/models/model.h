@@ -38,6 +38,8 @@ enum IntrinsicParameter : int {
   kRadial3,
   kDecentring1,
   kDecentring2,
+  kAffinity,
+  kSkew,
   // Radial corrections
   kSymmetryX = 3,
   kSymmetryY,
@@ -57,6 +59,7 @@ enum class ParameterRole {
   kSymmetry,        // centre of symmetry of a radial distortion; 5 % of the width
   kRadial,          // radial term; 0.2 at one focal length from the centre
   kTangential,      // decentring or thin prism; 0.01 at one focal length from the centre
+  kAffinity,        // affinity or skew of the pixels; 1 % of the focal length
   kAdditive,        // coefficient of a function over the image; 1 % of the width
   kImageSize        // width or height of the image; fixed
 };
@@ -75,6 +78,7 @@ struct CameraParameter {
   int degree = 0;
   bool fixed = false;             // follows from the size of the image and is never estimated
   bool same_as_rotation = false;  // a rotation of the camera has the same effect, so it is held unless asked for
+  bool rare = false;              // zero in most cameras, so it is held unless asked for; such parameters come last
 };
 
 // f, cx and cy, with which the parameters of every model begin.

@@ -1,5 +1,7 @@
 #include "io/exchange/bal/bal_camera.h"
 
+#include <algorithm>
+
 #include "io/base/error.h"
 
 namespace megablock {
@@ -9,6 +11,11 @@ namespace {
 const Eigen::Matrix3d kFlip = Eigen::Vector3d(1, -1, -1).asDiagonal();
 
 bool is_brown(const Intrinsics& k) { return k.model().kind == CameraModelKind::kBrown; }
+
+// Whether the camera is one of BAL: of Brown's model with f, k1 and k2 alone.
+bool is_bal(const Intrinsics& k) {
+  return is_brown(k) && std::all_of(k.begin() + kRadial3, k.end(), [](double value) { return value == 0; });
+}
 
 }  // namespace
 
@@ -31,7 +38,7 @@ Pose pose_from_bal(const BalCamera& camera) {
 std::optional<Eigen::Vector2d> to_bal_image(const Intrinsics& k, const Eigen::Vector2d& pixel) {
   Eigen::Vector2d image(pixel.x() - k[kPrincipalX], k[kPrincipalY] - pixel.y());
   // BAL's model is exactly this camera, so the pixel stays as it is.
-  if (is_brown(k) && k[kRadial3] == 0 && k[kDecentring1] == 0 && k[kDecentring2] == 0) return image;
+  if (is_bal(k)) return image;
   if (k.model().kind == CameraModelKind::kPinhole) return image;
   const auto ray = unproject(k, pixel);
   if (!ray) return std::nullopt;

@@ -9,10 +9,10 @@
 //
 //     R = S R_cw,  t = -S R_cw C,  p = (X/Z, -Y/Z)_ours,  p' = (u - cx, cy - v)
 //
-// The files cannot hold k3, p1, p2 and the corrections of other models. An observation of a camera with such parameters
-// is therefore converted to its ray (unproject) and projected with f, k1, k2 (0 for other models), so its ray stays the
-// same. Without such parameters it stays exactly the same pixel. Fisheyes and panoramas are refused. The files do not
-// hold the principal point.
+// The files cannot hold k3, p1, p2, b1, b2 and the corrections of other models. An observation of a camera with such
+// parameters is therefore converted to its ray (unproject) and projected with f, k1, k2 (0 for other models), so its
+// ray stays the same. Without such parameters it stays exactly the same pixel. Fisheyes and panoramas are refused. The
+// files do not hold the principal point.
 #pragma once
 
 #include <optional>

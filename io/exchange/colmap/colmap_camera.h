@@ -23,9 +23,11 @@ struct ColmapCamera {
   const ColmapCameraForm* form;
   std::vector<double> parameters;
 };
-// The first of COLMAP's models that holds all parameters which are not zero. Throws InputError, which names the camera,
-// if COLMAP has none for the camera's model.
+// The first of COLMAP's models that holds all parameters which are not zero, except for a skew, which none of them has.
+// Throws InputError, which names the camera, if COLMAP has none for the camera's model.
 ColmapCamera to_colmap(const std::string& camera, const Intrinsics& k);
+// The pixel that a camera without the skew b2 would have measured of the same ray: u - b2 y' with y' = (v - cy) / f.
+Eigen::Vector2d without_skew(const Intrinsics& k, const Eigen::Vector2d& pixel);
 
 // The camera of a form and its parameters. `refusal`, empty where it is possible, says why it is not.
 struct CameraFromColmap {

@@ -60,7 +60,8 @@ void write_model(const BlockResult& result, Writer& writer) {
                  end - begin);
     for (std::int64_t k = begin; k < end; ++k) {
       const auto position = static_cast<std::size_t>(by_image.observation[static_cast<std::size_t>(k)]);
-      writer.observation(view.pixel(view.observations[position]), point_id(view, track[position]), k == begin);
+      writer.observation(without_skew(view.intrinsics(i), view.pixel(view.observations[position])),
+                         point_id(view, track[position]), k == begin);
     }
     writer.end_image();
   }

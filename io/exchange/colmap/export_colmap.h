@@ -2,10 +2,11 @@
 //
 // COLMAP has our conventions: the rotation is world -> camera, t = -R C, the camera looks along +z with y down, and
 // pixel centres are at +0.5. The world is the ground frame of the block. Brown cameras are written as OPENCV (fx fy cx
-// cy k1 k2 p1 p2), or as FULL_OPENCV with k4 to k6 = 0 if k3 is not zero; both are exactly our model. Ids are the
-// indices of the block + 1. Images of rigs are written as single cameras. Points are grey, and their error is the mean
-// length of their residuals in pixels.
-// Internal to io/: it is not installed.
+// cy k1 k2 p1 p2) with fx = f + b1 and fy = f, or as FULL_OPENCV with k4 to k6 = 0 if k3 is not zero; both are exactly
+// our model without the skew b2. Observations of a camera with a skew are written as a camera without it would have
+// measured them, so their rays stay the same, but the images have the skew still (export_note in io/exchange/export.h).
+// Ids are the indices of the block + 1. Images of rigs are written as single cameras. Points are grey, and their error
+// is the mean length of their residuals in pixels. Internal to io/: it is not installed.
 #pragma once
 
 #include <string>

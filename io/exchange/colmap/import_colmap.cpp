@@ -36,7 +36,11 @@ void ColmapBuilder::add_camera(std::int64_t id, const ColmapCameraForm& form, st
   if (!converted.refusal.empty()) fail(which + " " + converted.refusal);
   camera.intrinsics = converted.intrinsics;
   if (!(camera.intrinsics[kFocal] > 0)) fail("the focal length of " + which + " is not positive");
-  camera.prior_sigma = weak_sigmas(camera.intrinsics, 0.05 * camera.intrinsics[kFocal], camera.width);
+  ParameterMask estimated = usual_parameters(CameraModel{form.kind});
+  // COLMAP has estimated two focal lengths, so the affinity is estimated here as well.
+  if (const auto p = find_parameter(camera.intrinsics.model(), "b1"); p && camera.intrinsics[*p] != 0)
+    estimated |= mask_of(*p);
+  camera.prior_sigma = weak_sigmas(camera.intrinsics, 0.05 * camera.intrinsics[kFocal], camera.width, estimated);
   camera.focal_known = true;
   Block& block = imported_.block;
   if (!cameras_.emplace(id, block.cameras.next_index()).second) fail(which + " appears twice");

@@ -3,7 +3,12 @@
 namespace megablock {
 
 IntrinsicSigmas default_intrinsic_sigmas(const Camera& camera) {
-  return weak_sigmas(camera.intrinsics, camera.intrinsics[kFocal] * (camera.focal_known ? 0.05 : 0.3), camera.width);
+  return default_intrinsic_sigmas(camera, usual_parameters(camera.intrinsics.model()));
+}
+
+IntrinsicSigmas default_intrinsic_sigmas(const Camera& camera, ParameterMask which) {
+  const double focal_sigma = camera.intrinsics[kFocal] * (camera.focal_known ? 0.05 : 0.3);
+  return weak_sigmas(camera.intrinsics, focal_sigma, camera.width, which);
 }
 
 }  // namespace megablock

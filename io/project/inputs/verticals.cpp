@@ -74,7 +74,7 @@ Eigen::Matrix3d covariance_of(const CsvTable& csv, std::size_t row, const Eigen:
 // because the direction can be corrected for it. A camera that differs more has taken other images of the same names.
 void check_camera(const std::vector<double>& values, const Camera& camera, const std::string& where) {
   constexpr double kFarthest = 3;  // times the prior sigma of a camera that is not calibrated
-  const IntrinsicSigmas sigma = default_intrinsic_sigmas(camera);
+  const IntrinsicSigmas sigma = default_intrinsic_sigmas(camera, free_parameters(camera.intrinsics.model()));
   for (std::size_t p = 0; p < values.size(); ++p) {
     const double now = camera.intrinsics[p];
     if (!(std::abs(values[p] - now) > kFarthest * sigma[p]) || is_fixed(camera.intrinsics.model(), static_cast<int>(p)))
@@ -87,10 +87,14 @@ void check_camera(const std::vector<double>& values, const Camera& camera, const
 }
 
 void read_dependence(const CsvTable& csv, std::size_t row, const Camera& camera, SeenVertical& vertical) {
-  const std::vector<double> values = numbers_of(csv, row, "camera"),
-                            derivatives = numbers_of(csv, row, "down_by_camera");
+  std::vector<double> values = numbers_of(csv, row, "camera"), derivatives = numbers_of(csv, row, "down_by_camera");
   if (derivatives.size() != 3 * values.size())
     throw InputError(csv.where(row) + ": 'down_by_camera' must have three numbers for each number of 'camera'");
+  // A file from before the model had its rare parameters says nothing of them.
+  if (std::ssize(values) == count_without_rare(camera.intrinsics.model())) {
+    values.resize(static_cast<std::size_t>(camera.intrinsics.size()), 0);
+    derivatives.resize(3 * values.size(), 0);
+  }
   if (!values.empty() && std::ssize(values) != camera.intrinsics.size())
     throw InputError(csv.where(row) + ": the vertical was found with another camera model of '" + camera.name +
                      "'; run 'megablock verticals' again");
@@ -147,7 +151,8 @@ std::string verticals_row(const SeenVertical& vertical, const std::string& image
 }
 
 Eigen::Matrix3Xd camera_error(const SeenVertical& vertical, const Camera& camera) {
-  const IntrinsicSigmas weak = weak_sigmas(camera.intrinsics, 0.3 * camera.intrinsics[kFocal], camera.width);
+  const IntrinsicSigmas weak = weak_sigmas(camera.intrinsics, 0.3 * camera.intrinsics[kFocal], camera.width,
+                                           free_parameters(camera.intrinsics.model()));
   Eigen::Matrix3Xd error = vertical.by_camera;
   for (Eigen::Index p = 0; p < vertical.camera.size(); ++p) {
     const auto at = static_cast<std::size_t>(p);

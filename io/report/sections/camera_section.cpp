@@ -81,6 +81,7 @@ std::string camera_table(const BlockResult& result, CameraIndex index) {
     const double start = camera.intrinsics[at], now = adjusted ? result.state.cameras[index][at] : kUnknown;
     const double sigma = sigmas ? std::sqrt(std::max(0.0, result.camera_covariance[index](k, k))) : kUnknown;
     const double prior = camera.prior_sigma[at];
+    if (camera_parameters(model)[at].rare && prior == 0 && start == 0) continue;
     const bool held = prior == 0 || sigma == 0;
     const double ratio = held ? kUnknown : std::abs(now - neutral(camera, k)) / sigma;
     // A focal length has no neutral value to be tested against.

@@ -82,7 +82,7 @@ CameraIndex add_camera(const SimulationOptions& options, const std::string& name
     truth[kDecentring2] = 1e-4 * random.normal();
   }
   if (options.calibrate && options.free_cameras) {
-    std::fill_n(camera.prior_sigma.begin(), camera.intrinsics.size(), std::numeric_limits<double>::infinity());
+    std::fill_n(camera.prior_sigma.begin(), kDecentring2 + 1, std::numeric_limits<double>::infinity());
     camera.prior_sigma[kRadial3] = 0;
   } else {
     camera.intrinsics = truth;

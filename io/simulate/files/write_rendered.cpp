@@ -164,6 +164,7 @@ void write_cameras(const SimulationOptions& options, const Block& block, std::os
   // The headers of the images are sufficient, unless there is a calibration to start from or to hold.
   if (options.calibrate && !is_stereopolis(options)) {
     if (!brown) yaml << "cameras:\n  default: {model: " << options.camera_model << "}\n";
+    if (options.affinity > 0) yaml << "cameras:\n  default: {calibrate: [usual, b1, b2]}\n";
     return;
   }
   yaml << "cameras:\n  grouping: " << (block.cameras.size() > 1 ? "exif" : "one") << '\n';

@@ -51,13 +51,16 @@ CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layou
     truth[kDecentring1] = random.uniform(-4e-4, 4e-4);
     truth[kDecentring2] = random.uniform(-4e-4, 4e-4);
   }
+  if (options.affinity > 0)
+    for (const int p : {kAffinity, kSkew}) truth[p] = options.affinity * options.focal_px * random.uniform(-1, 1);
   if (options.published_camera > 0)
     truth = published_cameras()[static_cast<std::size_t>(options.published_camera - 1)].truth;
   if (options.calibrate) {
     constexpr double kFree = std::numeric_limits<double>::infinity();
     // The true Brown camera has no k3, so k3 is held at zero.
+    const double rare = options.affinity > 0 ? kFree : 0;
     if (model == CameraModel())
-      camera.prior_sigma = {kFree, kFree, kFree, kFree, kFree, 0, kFree, kFree};
+      camera.prior_sigma = {kFree, kFree, kFree, kFree, kFree, 0, kFree, kFree, rare, rare};
     else
       camera.prior_sigma = weak;
   } else {

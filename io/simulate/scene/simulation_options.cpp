@@ -106,6 +106,9 @@ void SimulationOptions::check() const {
   require_option(depth_spread >= 0 && depth_spread < 0.9, "depth_spread must lie in [0, 0.9)");
   require_option(std::abs(off_centre_m) < 0.05 * panorama_radius_m,
                  "off_centre_m must be below 5 % of panorama_radius_m");
+  require_option(affinity >= 0 && affinity < 0.1, "affinity must lie in [0, 0.1)");
+  require_option(affinity == 0 || (camera_model == model_name(CameraModel()) && published_camera == 0),
+                 "affinity needs the camera model brown");
   require_option(start_focal > 0.2 && start_focal < 5, "start_focal must lie in (0.2, 5)");
   require_option(published_camera == 0 || !has_vehicle(scene),
                  "published_camera is not for scenes with the vehicle's rig");

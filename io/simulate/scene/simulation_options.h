@@ -75,6 +75,9 @@ struct SimulationOptions {
   int published_camera = 0;  // 1 to 4: the true camera is one of panorama.h (use_published_camera()). 0: none
   double start_focal = 1;    // initial focal length of the block, over the nominal one
   bool distortion = true;    // the true camera has k1, k2, p1, p2 (other models: all terms); initial values are zero
+  // Brown's model: largest affinity b1 and skew b2 of the true camera, as a share of the focal length. They are free
+  // then, and zero at first.
+  double affinity = 0;
   bool calibrate = true;     // camera parameters are free; otherwise held at the truth
   bool free_cameras = true;  // Stereopolis, target field: cameras are free; otherwise held (mounts as `calibrate`)
   // Aerial, street, panorama: takes a camera of the published simulations (1 to 4) with its size and focal length as

@@ -15,6 +15,16 @@ std::size_t columns_of(const std::vector<CameraModel>& models) {
   return static_cast<std::size_t>(most);
 }
 
+// Number of columns of a matrix of parameters in a file. Files from before a model had its rare parameters lack these;
+// they are zero then.
+std::size_t columns_in(const Hdf5Reader& file, const std::string& name, const std::vector<CameraModel>& models) {
+  int least = 1;
+  for (const CameraModel& model : models) least = std::max(least, count_without_rare(model));
+  const std::vector<std::int64_t> shape = file.shape(name);
+  const bool older = shape.size() > 1 && shape.back() == least;
+  return older ? static_cast<std::size_t>(least) : columns_of(models);
+}
+
 std::size_t count(const CameraModel& model) { return static_cast<std::size_t>(parameter_count(model)); }
 
 }  // namespace
@@ -48,10 +58,11 @@ void put_parameters(Hdf5Writer& file, const std::string& name, const std::vector
 
 void get_parameters(const Hdf5Reader& file, const std::string& name, const std::vector<CameraModel>& models,
                     const std::vector<double*>& values) {
-  const std::size_t columns = columns_of(models);
+  const std::size_t columns = columns_in(file, name, models);
   const auto matrix =
       file.matrix<double>(name, static_cast<std::int64_t>(columns), static_cast<std::int64_t>(models.size()));
-  for (std::size_t c = 0; c < models.size(); ++c) std::copy_n(&matrix[c * columns], count(models[c]), values[c]);
+  for (std::size_t c = 0; c < models.size(); ++c)
+    std::copy_n(&matrix[c * columns], std::min(columns, count(models[c])), values[c]);
 }
 
 std::vector<Intrinsics> get_intrinsics(const Hdf5Reader& file, std::int64_t rows) {
@@ -75,13 +86,15 @@ void put_covariances(Hdf5Writer& file, const std::vector<Eigen::MatrixXd>& covar
 }
 
 std::vector<Eigen::MatrixXd> get_covariances(const Hdf5Reader& file, const std::vector<CameraModel>& models) {
-  const std::size_t size = columns_of(models);
+  const std::size_t size = columns_in(file, kCovariance, models);
   const auto n = static_cast<std::int64_t>(size);
   const auto values = file.array<double>(kCovariance, {static_cast<std::int64_t>(models.size()), n, n});
   std::vector<Eigen::MatrixXd> covariances;
   for (std::size_t c = 0; c < models.size(); ++c) {
     const Eigen::Map<const Eigen::MatrixXd> padded(&values[c * size * size], n, n);
-    covariances.push_back(padded.topLeftCorner(parameter_count(models[c]), parameter_count(models[c])));
+    const Eigen::Index all = parameter_count(models[c]), there = std::min(n, all);
+    covariances.emplace_back(Eigen::MatrixXd::Zero(all, all));
+    covariances.back().topLeftCorner(there, there) = padded.topLeftCorner(there, there);
   }
   return covariances;
 }

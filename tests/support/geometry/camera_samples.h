@@ -29,7 +29,7 @@ inline Intrinsics sample_camera(const CameraModel& model, double focal, int widt
   k[kPrincipalY] -= 7;
   switch (model.kind) {
     case CameraModelKind::kBrown:
-      for (int p = 3; const double value : {-0.12, 0.05, -0.01, 1e-3, -7e-4}) k[p++] = value;
+      for (int p = 3; const double value : {-0.12, 0.05, -0.01, 1e-3, -7e-4, 4.2, -1.7}) k[p++] = value;
       break;
     case CameraModelKind::kFisheye:
       for (int p = 3; const double value : {-0.03, 0.012, -0.008, 0.001}) k[p++] = value;

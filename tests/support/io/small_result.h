@@ -1,5 +1,5 @@
 // Gives a small result with everything that the exporters must tell apart: a rig of two cameras, a camera with every
-// distortion parameter, an image without orientation, points without position, rejected observations.
+// parameter but the skew, an image without orientation, points without position, rejected observations.
 #pragma once
 
 #include <cmath>
@@ -20,7 +20,7 @@ inline BlockResult small_result(bool full_distortion = true) {
     camera.width = 2000;
     camera.height = 1500;
     camera.intrinsics = {1500.0 + 20 * c, 1003.25, 747.5, -0.11, 0.05, 0, 0, 0};
-    if (full_distortion && c == 1) camera.intrinsics = {1520, 1003.25, 747.5, -0.11, 0.05, 0.013, 0.0011, -0.0007};
+    if (full_distortion && c == 1) camera.intrinsics = {1520, 1003.25, 747.5, -0.11, 0.05, 0.013, 0.0011, -0.0007, 3.5};
     block.cameras.push_back(camera);
   }
   const Pose mount{rotation_exp<double>({0.02, 0.3, -0.05}), {0.5, 0.1, -0.2}};

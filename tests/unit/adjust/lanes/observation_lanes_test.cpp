@@ -36,7 +36,7 @@ class Lanes : public testing::Test {
       lanes.add(lane_views_[i], points_[i], measured_[i].x(), measured_[i].y(), inverse_sigma_[i]);
   }
 
-  const Intrinsics camera_{1500, 1010, 790, -0.11, 0.04, -0.007, 6e-4, -3e-4};
+  const Intrinsics camera_{1500, 1010, 790, -0.11, 0.04, -0.007, 6e-4, -3e-4, 5.5, -2.5};
   std::vector<ImageView> views_;
   std::vector<LaneView> lane_views_;
   std::vector<Eigen::Vector3d> points_;

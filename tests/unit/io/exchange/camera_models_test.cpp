@@ -8,6 +8,7 @@
 #include "io/exchange/import.h"
 #include "io/project/project.h"
 #include "io/simulate/blocks/simulate.h"
+#include "io/store/hdf5/hdf5_cameras.h"
 #include "io/store/units/adjustment_file.h"
 #include "io/store/units/block_file.h"
 #include "io/store/units/state_file.h"
@@ -39,6 +40,27 @@ Block every_camera() {
     block.cameras.push_back(std::move(camera));
   }
   return block;
+}
+
+// Files from before a model had its rare parameters: these are zero, and unknown in covariances.
+TEST(CameraModelFiles, WithoutRareParametersAreRead) {
+  ScratchDirectory folder;
+  const std::vector<double> values = {1400, 960, 540, -0.1, 0.02, 0.003, 1e-3, 2e-3};
+  const std::vector<CameraModel> models(1);
+  {
+    Hdf5Writer file(folder.path("old.h5"), "test");
+    file.group("cameras");
+    put_models(file, models);
+    file.matrix("cameras/intrinsics", values, 8);
+    file.array("cameras/covariance", std::vector<double>(64, 0.5), {1, 8, 8});
+    file.close();
+  }
+  const Hdf5Reader file(folder.path("old.h5"), "test");
+  EXPECT_EQ(get_intrinsics(file, 1).front(), (Intrinsics{1400, 960, 540, -0.1, 0.02, 0.003, 1e-3, 2e-3, 0, 0}));
+  const Eigen::MatrixXd covariance = get_covariances(file, models).front();
+  ASSERT_EQ(covariance.rows(), 10);
+  EXPECT_EQ(covariance(7, 7), 0.5);
+  EXPECT_EQ(covariance(8, 8), 0);
 }
 
 TEST(CameraModelFiles, KeepEveryModel) {
@@ -93,6 +115,19 @@ TEST_F(CameraModelProject, TakesModelAndParameters) {
   for (std::size_t p = 0; p < expected.size(); ++p) EXPECT_DOUBLE_EQ(camera.prior_sigma[p], expected[p]);
 }
 
+TEST_F(CameraModelProject, EstimatesAffinityWhenAsked) {
+  const std::string start = "    focal_px: 1400\n    distortion: {b1: -2.5, b2: 0.5}\n";
+  const Camera held = read(start), free = read(start + "    calibrate: [usual, b1, b2]\n");
+  EXPECT_EQ(held.intrinsics[kAffinity], -2.5);
+  EXPECT_EQ(held.intrinsics[kSkew], 0.5);
+  EXPECT_EQ(held.prior_sigma[kAffinity], 0);
+  EXPECT_EQ(held.prior_sigma[kSkew], 0);
+  EXPECT_DOUBLE_EQ(free.prior_sigma[kAffinity], 14);
+  EXPECT_DOUBLE_EQ(free.prior_sigma[kSkew], 14);
+  for (int p = 0; p < kAffinity; ++p)
+    EXPECT_EQ(free.prior_sigma[static_cast<std::size_t>(p)], held.prior_sigma[static_cast<std::size_t>(p)]);
+}
+
 TEST_F(CameraModelProject, KnowsEveryModel) {
   for (const CameraModel& model : every_model()) {
     const Camera camera = read("    model: " + model_name(model) + "\n");
@@ -109,7 +144,7 @@ TEST_F(CameraModelProject, RefusesByLine) {
               HasSubstr("block.yaml:5: unknown key 'k1'"));
   EXPECT_THAT(refusal("    model: pinhole\n    calibrate: [k1]\n"),
               AllOf(HasSubstr("block.yaml:5: calibrate: 'k1' is not a parameter of camera '"),
-                    HasSubstr("(model pinhole); its parameters are focal, principal_point, f, cx, cy")));
+                    HasSubstr("(model pinhole); its parameters are usual, focal, principal_point, f, cx, cy")));
   EXPECT_THAT(refusal("    model: legendre-2\n    calibrate: [width]\n"), HasSubstr("size of the image"));
   EXPECT_THAT(refusal("    model: equirectangular\n    focal_px: 300\n"), HasSubstr("block.yaml:5: the focal length"));
 }
@@ -130,7 +165,7 @@ BlockResult result_with(const std::string& name) {
 }
 
 TEST(CameraModelExchange, ColmapKeepsPinholeAndFisheye) {
-  for (const char* model : {"pinhole", "opencv-fisheye", "brown"})
+  for (const char* model : {"pinhole", "opencv-fisheye"})
     for (const char* format : {"colmap-text", "colmap-bin"}) {
       ScratchDirectory folder;
       const BlockResult result = result_with(model);
@@ -141,6 +176,77 @@ TEST(CameraModelExchange, ColmapKeepsPinholeAndFisheye) {
   ScratchDirectory folder;
   export_result(result_with("opencv-fisheye"), "colmap-text", folder.path("model"));
   EXPECT_THAT(read_file(folder.path("model/cameras.txt")), HasSubstr(" OPENCV_FISHEYE "));
+}
+
+std::vector<Eigen::Vector2d> measured_in(const BlockResult& result, const std::string& image) {
+  std::vector<Eigen::Vector2d> all;
+  for (std::size_t o = 0; o < result.tracks.image.size(); ++o)
+    if (result.block.name_of(result.tracks.image[o]) == image)
+      all.emplace_back(from_fixed_pixel(result.tracks.x[o]), from_fixed_pixel(result.tracks.y[o]));
+  return all;
+}
+
+// fx = f + b1 and fy = f. The skew, which COLMAP does not have, is taken out of the observations.
+TEST(CameraModelExchange, ColmapHasTwoFocalLengthsAndNoSkew) {
+  const BlockResult result = result_with("brown");
+  const Intrinsics given = result.state.cameras[CameraIndex(0)];
+  ASSERT_NE(given[kAffinity], 0);
+  ASSERT_NE(given[kSkew], 0);
+  for (const char* format : {"colmap-text", "colmap-bin"}) {
+    ScratchDirectory folder;
+    export_result(result, format, folder.path("model"));
+    const ImportedBlock imported = import_block(format, folder.path("model"));
+    const Intrinsics back = imported.state.cameras[CameraIndex(0)];
+    for (int p = 0; p < kSkew; ++p) EXPECT_NEAR(back[p], given[p], 1e-12 * std::abs(given[kFocal])) << p;
+    EXPECT_EQ(back[kSkew], 0);
+    const IntrinsicSigmas& sigma = imported.block.cameras[CameraIndex(0)].prior_sigma;
+    EXPECT_GT(sigma[kAffinity], 0);
+    EXPECT_EQ(sigma[kSkew], 0);
+    // The rays of the observations stay the same.
+    ASSERT_GT(imported.tracks.observation_count(), 50);
+    std::int64_t compared = 0;
+    for (std::int64_t t = 0; t < imported.tracks.track_count(); ++t)
+      for (std::int64_t o = imported.tracks.begin[t]; o < imported.tracks.begin[t + 1]; ++o) {
+        const Eigen::Vector2d pixel(from_fixed_pixel(imported.tracks.x[o]), from_fixed_pixel(imported.tracks.y[o]));
+        const CameraIndex camera = imported.block.camera_of(imported.tracks.image[o]);
+        const Intrinsics& k = result.state.cameras[camera];
+        const auto ray = viewing_ray(imported.state.cameras[camera], pixel);
+        ASSERT_TRUE(ray);
+        const Eigen::Vector2d ours = project(k, *ray);
+        double nearest = 1;
+        for (const Eigen::Vector2d& measured : measured_in(result, imported.block.name_of(imported.tracks.image[o])))
+          nearest = std::min(nearest, (measured - ours).norm());
+        EXPECT_LT(nearest, 1.01 / 2048);  // the import rounds to 1/1024 px
+        compared += std::abs(ours.x() - pixel.x()) > 0.1;
+      }
+    EXPECT_GT(compared, 10);
+    EXPECT_THAT(export_note(result, format), HasSubstr("COLMAP files have no skew (b2)"));
+  }
+  EXPECT_THAT(export_note(result, "bundler"), HasSubstr("no affinity and skew (b1, b2)"));
+  EXPECT_EQ(export_note(result, "csv"), "");
+  EXPECT_EQ(export_note(result_with("pinhole"), "bal"), "");
+}
+
+// What COLMAP calibrated with two focal lengths.
+TEST(CameraModelExchange, TakesTwoFocalLengths) {
+  ScratchDirectory folder;
+  write_file(folder.path("cameras.txt"),
+             "1 OPENCV 100 80 91 90 50 40 -0.1 0.02 1e-3 2e-3\n2 PINHOLE 100 80 89 90 50 40\n"
+             "3 FULL_OPENCV 100 80 90 90 50 40 -0.1 0.02 1e-3 2e-3 0.003 0 0 0\n");
+  write_file(folder.path("images.txt"),
+             "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0 0 2 b.jpg\n\n3 1 0 0 0 0 0 0 3 c.jpg\n\n");
+  write_file(folder.path("points3D.txt"), "");
+  const Block block = import_block("colmap-text", folder.path()).block;
+  EXPECT_EQ(block.cameras[CameraIndex(0)].intrinsics, (Intrinsics{90, 50, 40, -0.1, 0.02, 0, 1e-3, 2e-3, 1}));
+  EXPECT_EQ(block.cameras[CameraIndex(1)].intrinsics, (Intrinsics{90, 50, 40, 0, 0, 0, 0, 0, -1}));
+  EXPECT_EQ(block.cameras[CameraIndex(2)].intrinsics, (Intrinsics{90, 50, 40, -0.1, 0.02, 0.003, 1e-3, 2e-3}));
+  const auto estimated = [&](int camera, int p) {
+    return block.cameras[CameraIndex(camera)].prior_sigma[static_cast<std::size_t>(p)] > 0;
+  };
+  EXPECT_TRUE(estimated(0, kAffinity) && estimated(1, kAffinity));
+  EXPECT_FALSE(estimated(2, kAffinity));  // its focal lengths are one
+  EXPECT_FALSE(estimated(1, kRadial1));   // COLMAP's model has no distortion
+  EXPECT_FALSE(estimated(0, kSkew));
 }
 
 // The parameters stand in COLMAP's order, which is not ours, and come back.

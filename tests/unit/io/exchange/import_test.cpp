@@ -231,7 +231,8 @@ TEST(Import, BadColmapModelsAreRefusedByLine) {
   EXPECT_EQ(refusal(camera, "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0 0 1 b.jpg\n\n", ""), "") << "no observations";
   EXPECT_THAT(refusal(camera, image, ""), HasSubstr("images.txt:2: an observation names point 7"));
   EXPECT_THAT(refusal("1 FISHEYE 100 80 90 50 40\n", image, ""), HasSubstr("cameras.txt:1: camera model 'FISHEYE'"));
-  EXPECT_THAT(refusal("1 PINHOLE 100 80 90 91 50 40\n", image, ""), HasSubstr("square pixels"));
+  EXPECT_THAT(refusal("1 OPENCV_FISHEYE 100 80 90 91 50 40 0 0 0 0\n", image, ""),
+              HasSubstr("in the model opencv-fisheye only square pixels"));
   EXPECT_THAT(refusal("x PINHOLE 100 80 90 90 50 40\n", image, ""), HasSubstr("'x' is not a whole number"));
   EXPECT_THAT(refusal("1 SIMPLE_RADIAL 100 80 90 50 40\n2 SIMPLE_RADIAL 100 80 90 50 40 -0.1\n", image, ""),
               HasSubstr("cameras.txt:1: the line ends before all 4 parameters of SIMPLE_RADIAL"));

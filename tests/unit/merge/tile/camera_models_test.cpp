@@ -36,6 +36,8 @@ SimulatedBlock with_model(const Case& c) {
   camera.intrinsics = start_intrinsics(model, camera.intrinsics[kFocal], camera.width, camera.height);
   if (model.kind == CameraModelKind::kEquirectangular) s.truth.cameras[index] = camera.intrinsics;  // cx is held
   camera.prior_sigma = weak_sigmas(camera.intrinsics, 50, camera.width);
+  if (model.kind == CameraModelKind::kBrown)  // with affinity and skew
+    camera.prior_sigma = weak_sigmas(camera.intrinsics, 50, camera.width, free_parameters(model));
 
   Pose& mount = s.truth.mounts[RigIndex(0)][0];
   mount.rotation = rotation_exp<double>(Eigen::Vector3d(0, c.turn_deg * 0.017453292519943295, 0)) * mount.rotation;
@@ -100,8 +102,8 @@ TEST_P(CameraModels, AdjustAsOneCeresProblem) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, CameraModels,
-                         testing::Values(Case{"pinhole", 0}, Case{"ign-radial", 0}, Case{"odd-radial-2", 0},
-                                         Case{"even-radial-3", 0}, Case{"opencv-fisheye", 50},
+                         testing::Values(Case{"brown", 0}, Case{"pinhole", 0}, Case{"ign-radial", 0},
+                                         Case{"odd-radial-2", 0}, Case{"even-radial-3", 0}, Case{"opencv-fisheye", 50},
                                          Case{"equirectangular", 120}, Case{"polynomial-3", 0}, Case{"legendre-4", 0},
                                          Case{"fourier-1", 0}),
                          [](const auto& p) {

@@ -274,6 +274,27 @@ TEST_P(SimulateTest, CamerasStartNominalUnlessHeld) {
   }
 }
 
+// An affinity is drawn last, so that the block is the same otherwise.
+TEST_P(SimulateTest, CamerasHaveAnAffinityWhenAsked) {
+  SimulationOptions options = GetParam(), with = options;
+  options.frames = with.frames = 20;
+  with.affinity = 0.002;
+  const SimulatedBlock plain = simulate_block(options), s = simulate_block(with);
+  for (std::size_t c = 0; c < s.block.cameras.size(); ++c) {
+    const CameraIndex index(static_cast<std::int64_t>(c));
+    const Intrinsics &truth = s.truth.cameras[index], &before = plain.truth.cameras[index];
+    for (int p = 0; p < kAffinity; ++p) EXPECT_EQ(truth[p], before[p]);
+    for (const int p : {kAffinity, kSkew}) {
+      EXPECT_EQ(before[p], 0);
+      EXPECT_NE(truth[p], 0);
+      EXPECT_LE(std::abs(truth[p]), 0.002 * options.focal_px);
+      EXPECT_EQ(s.block.cameras[index].intrinsics[p], 0);
+      EXPECT_GT(s.block.cameras[index].prior_sigma[static_cast<std::size_t>(p)], 0);
+      EXPECT_EQ(plain.block.cameras[index].prior_sigma[static_cast<std::size_t>(p)], 0);
+    }
+  }
+}
+
 // Share of an image's ground footprint that its neighbour sees, from the distances of the projection centres.
 TEST(SimulateAerial, OverlapsAreAsAsked) {
   SimulationOptions options = aerial_options();
