@@ -97,15 +97,10 @@ inline bool BrownModel::linearise(const double* k, const Eigen::Vector3d& point,
 
   const double r2 = x * x + y * y, r4 = r2 * r2, r6 = r4 * r2, xy = 2 * x * y;
   result.by_intrinsics.resize(2, 10);
-  // Of the distorted (x', y'), by k1, k2, k3, p1, p2.
-  Eigen::Matrix<double, 2, 5> by_distortion;
-  by_distortion << x * r2, x * r4, x * r6, xy, r2 + 2 * x * x,  //
-      y * r2, y * r4, y * r6, r2 + 2 * y * y, xy;
-  Eigen::Map<Eigen::Matrix<double, 2, 10>> by_all(result.by_intrinsics.data());
-  by_all.leftCols<3>() << d.point.x(), 1, 0, d.point.y(), 0, 1;
-  by_all.row(0).segment<5>(kRadial1) = fx * by_distortion.row(0) + skew * by_distortion.row(1);
-  by_all.row(1).segment<5>(kRadial1) = f * by_distortion.row(1);
-  by_all.rightCols<2>() << d.point.x(), d.point.y(), 0, 0;
+  Eigen::Map<Eigen::Matrix<double, 2, 10>>(result.by_intrinsics.data()) << d.point.x(), 1, 0,
+      fx * x * r2 + skew * y * r2, fx * x * r4 + skew * y * r4, fx * x * r6 + skew * y * r6,
+      fx * xy + skew * (r2 + 2 * y * y), fx * (r2 + 2 * x * x) + skew * xy, d.point.x(), d.point.y(),  //
+      d.point.y(), 0, 1, f * y * r2, f * y * r4, f * y * r6, f * (r2 + 2 * y * y), f * xy, 0, 0;
   return true;
 }
 

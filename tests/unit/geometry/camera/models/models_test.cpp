@@ -319,6 +319,12 @@ TEST(Brown, WithoutAffinityHasTheBitsOfTheFormulaWithoutIt) {
       ASSERT_TRUE(BrownModel::linearise(k.data(), point, true, p));
       EXPECT_EQ(p.pixel, Eigen::Vector2d(k[1] + k[0] * d.point.x(), k[2] + k[0] * d.point.y()));
       EXPECT_EQ((p.by_point.leftCols<2>()), (k[0] * (1 / point.z())) * d.jacobian);
+      const double x = point.x() * (1 / point.z()), y = point.y() * (1 / point.z()), r2 = x * x + y * y, f = k[0];
+      Eigen::Matrix<double, 2, 8> by_intrinsics;
+      by_intrinsics << d.point.x(), 1, 0, f * x * r2, f * x * (r2 * r2), f * x * (r2 * r2 * r2), f * (2 * x * y),
+          f * (r2 + 2 * x * x), d.point.y(), 0, 1, f * y * r2, f * y * (r2 * r2), f * y * (r2 * r2 * r2),
+          f * (r2 + 2 * y * y), f * (2 * x * y);
+      EXPECT_EQ((p.by_intrinsics.leftCols<8>()), by_intrinsics);
     }
 }
 
