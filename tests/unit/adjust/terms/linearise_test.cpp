@@ -13,6 +13,7 @@
 #include "adjust/terms/vertical_terms.h"
 #include "adjust/tile/ceres_problem.h"
 #include "geometry/camera/camera.h"
+#include "geometry/camera/models/brown.h"
 
 namespace megablock {
 namespace {
@@ -71,6 +72,8 @@ void expect_residual(const Eigen::VectorXd& ours, const Eigen::VectorXd& referen
   EXPECT_LE((ours - reference).norm(), 1e-9 * (1 + reference.norm()));
 }
 
+constexpr int kBrown = BrownModel::parameter_count(0);
+
 class Linearise : public testing::TestWithParam<int> {
  protected:
   double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
@@ -84,8 +87,8 @@ class Linearise : public testing::TestWithParam<int> {
     return {uniform(low, high), uniform(low, high), uniform(low, high)};
   }
   Intrinsics intrinsics() {
-    return {uniform(800, 4000), uniform(500, 2000),   uniform(500, 2000),   uniform(-0.2, 0.2),
-            uniform(-0.1, 0.1), uniform(-0.05, 0.05), uniform(-0.01, 0.01), uniform(-0.01, 0.01)};
+    return {uniform(800, 4000),   uniform(500, 2000),   uniform(500, 2000),   uniform(-0.2, 0.2), uniform(-0.1, 0.1),
+            uniform(-0.05, 0.05), uniform(-0.01, 0.01), uniform(-0.01, 0.01), uniform(-20, 20),   uniform(-20, 20)};
   }
 
   std::mt19937_64 random_{static_cast<std::uint64_t>(GetParam())};
@@ -101,14 +104,14 @@ TEST_P(Linearise, Image) {
   const double weight = uniform(0.5, 4);
 
   const ImageResidual ours = linearise_image(frame, mount, k, point, measured, weight);
-  const Evaluated reference = by_ceres<2, 7, 7, 8, 3>(residual::ImageMeasured{k.model(), measured, weight},
-                                                      {block(frame), block(mount), block(k), block(point)});
+  const Evaluated reference = by_ceres<2, 7, 7, kBrown, 3>(residual::ImageMeasured{k.model(), measured, weight},
+                                                           {block(frame), block(mount), block(k), block(point)});
   ASSERT_TRUE(ours.in_front);
   expect_residual(ours.residual, reference.residual);
-  Matrix jacobian(2, 23);
+  Matrix jacobian(2, 15 + kBrown);
   jacobian << ours.by_frame, ours.by_mount, ours.by_intrinsics, ours.by_point;
   expect_same(jacobian.leftCols(12), reference.jacobian.leftCols(12));
-  expect_same(jacobian.middleCols(12, 8), reference.jacobian.middleCols(12, 8));
+  expect_same(jacobian.middleCols(12, kBrown), reference.jacobian.middleCols(12, kBrown));
   expect_same(jacobian.rightCols(3), reference.jacobian.rightCols(3));
 }
 
@@ -166,17 +169,17 @@ TEST_P(Linearise, Vertical) {
   const Eigen::Matrix<double, 3, 2> plane = tangent_plane(seen.down);
   const Eigen::Matrix2d root{{uniform(1e-4, 1e-2), 0}, {uniform(-1e-3, 1e-3), uniform(1e-4, 1e-2)}};
   seen.covariance = plane * root * root.transpose() * plane.transpose();
-  seen.camera = Eigen::VectorXd(8);
-  for (int p = 0; p < 8; ++p) seen.camera[p] = k[static_cast<std::size_t>(p)] * uniform(0.9, 1.1);
-  seen.by_camera.resize(3, 8);
-  for (int p = 0; p < 8; ++p) seen.by_camera.col(p) = plane * plane.transpose() * vector(0.1);
+  seen.camera = Eigen::VectorXd(kBrown);
+  for (int p = 0; p < kBrown; ++p) seen.camera[p] = k[static_cast<std::size_t>(p)] * uniform(0.9, 1.1);
+  seen.by_camera.resize(3, kBrown);
+  for (int p = 0; p < kBrown; ++p) seen.by_camera.col(p) = plane * plane.transpose() * vector(0.1);
 
   const auto term = vertical_term(seen, GroundVertical(GroundFrame()), frame.centre);
   const VerticalResidual ours = linearise_vertical(frame, mount, k, term);
   const Evaluated reference =
-      by_ceres<2, 7, 7, 8>(residual::VerticalSeen{term}, {block(frame), block(mount), block(k)});
+      by_ceres<2, 7, 7, kBrown>(residual::VerticalSeen{term}, {block(frame), block(mount), block(k)});
   expect_residual(ours.residual, reference.residual);
-  Matrix jacobian(2, 20);
+  Matrix jacobian(2, 12 + kBrown);
   jacobian << ours.by_frame, ours.by_mount, -term.by_camera;
   expect_same(jacobian, reference.jacobian);
 
@@ -231,8 +234,8 @@ TEST_P(Linearise, LinearPriors) {
 
   TileProblem::IntrinsicTerm term{LocalCamera(0), intrinsics(), {}};
   const Intrinsics k = intrinsics();
-  term.sigma = {10, 0, std::numeric_limits<double>::infinity(), 0.1, 0.01, 0, 0.001, 0.001};
-  const Evaluated known = by_ceres<8, 8>(residual::IntrinsicsKnown{term}, {block(k)});
+  term.sigma = {10, 0, std::numeric_limits<double>::infinity(), 0.1, 0.01, 0, 0.001, 0.001, 5, 0};
+  const Evaluated known = by_ceres<kBrown, kBrown>(residual::IntrinsicsKnown{term}, {block(k)});
   for (int i = 0; i < k.size(); ++i) {
     EXPECT_DOUBLE_EQ(intrinsic_prior_residual(k, term, i), known.residual[i]);
     EXPECT_DOUBLE_EQ(intrinsic_prior_weight(term, i), known.jacobian(i, i));
