@@ -2,6 +2,9 @@
 // sigma, each independent of the others.
 //
 // The tile of the first oriented image of the camera owns them.
+#include <algorithm>
+#include <array>
+
 #include "adjust/terms/automatic_terms.h"
 #include "adjust/terms/linearise.h"
 #include "adjust/terms/terms.h"
@@ -10,14 +13,26 @@ namespace megablock {
 
 namespace {
 
-// The prior of a camera has as many residuals as the camera has parameters.
+// Residuals of the leading parameters of a camera, as far as one of them has a prior or is not rare.
 struct DynamicIntrinsicsKnown {
   residual::IntrinsicsKnown known;
+  int rows;
   template <typename Scalar>
   bool operator()(const Scalar* const* blocks, Scalar* result) const {
-    return known(blocks[0], result);
+    std::array<Scalar, kMaxIntrinsics> all;
+    known(blocks[0], all.data());
+    std::copy_n(all.begin(), rows, result);
+    return true;
   }
 };
+
+// Residuals that are always zero would still change how Ceres sums its cost, and so the last bits of a result.
+int rows_of(const TileProblem::IntrinsicTerm& term) {
+  int rows = count_without_rare(term.value.model());
+  for (int k = rows; k < term.value.size(); ++k)
+    if (intrinsic_prior_weight(term, k) > 0) rows = k + 1;
+  return rows;
+}
 
 class IntrinsicPriors final : public ObservationType {
  public:
@@ -47,8 +62,9 @@ class IntrinsicPriors final : public ObservationType {
   }
   ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const override {
     const TileProblem::IntrinsicTerm& term = problem.intrinsic_priors[row];
-    const int count = term.value.size();
-    return automatic_dynamic_term(DynamicIntrinsicsKnown{residual::IntrinsicsKnown{term}}, count, {count});
+    const int rows = rows_of(term);
+    return automatic_dynamic_term(DynamicIntrinsicsKnown{residual::IntrinsicsKnown{term}, rows}, rows,
+                                  {term.value.size()});
   }
 };
 

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "io/base/hash.h"
+#include "io/block/camera_hash.h"
 #include "io/block/track_rows.h"
 #include "io/result/result_digest.h"
 #include "io/result/track_batches.h"
@@ -19,14 +20,6 @@ void add_pose(Hasher& hasher, const Pose& pose) {
   for (const double c : pose.centre) hasher.add(c);
 }
 
-// Rare parameters count only where one of them is not zero: the digest of a camera without them is that of before they
-// were in the model.
-void add_camera(Hasher& hasher, const Intrinsics& k) {
-  const double* rare = k.begin() + count_without_rare(k.model());
-  const bool any = std::any_of(rare, k.end(), [](double value) { return value != 0; });
-  std::for_each(k.begin(), any ? k.end() : rare, [&](double value) { hasher.add(value); });
-}
-
 void add_state(Hasher& hasher, const BlockState& state) {
   hasher.add(state.frames.size());
   for (FrameIndex f(0); state.frames.contains(f); ++f.value) {
@@ -34,7 +27,7 @@ void add_state(Hasher& hasher, const BlockState& state) {
     if (state.oriented[f]) add_pose(hasher, state.frames[f]);
   }
   hasher.add(state.cameras.size());
-  for (const Intrinsics& intrinsics : state.cameras) add_camera(hasher, intrinsics);
+  for (const Intrinsics& intrinsics : state.cameras) add_values_to_hash(hasher, intrinsics);
   hasher.add(state.mounts.size());
   for (const std::vector<Pose>& rig : state.mounts) {
     hasher.add(rig.size());

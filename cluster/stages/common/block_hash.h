@@ -3,6 +3,7 @@
 
 #include "io/base/hash.h"
 #include "io/block/block.h"
+#include "io/block/camera_hash.h"
 
 namespace megablock {
 
@@ -30,7 +31,7 @@ inline void add_to_hash(Hasher& hasher, const AttitudePrior& prior) {
 
 inline void add_to_hash(Hasher& hasher, const Intrinsics& k) {
   hasher.add(k.model().kind).add(k.model().order);
-  for (const double value : k) hasher.add(value);
+  add_values_to_hash(hasher, k);
 }
 
 // The values of a frame, besides its pose, that an adjustment uses.

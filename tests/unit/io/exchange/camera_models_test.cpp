@@ -306,9 +306,9 @@ TEST(CameraModelExchange, CsvLeavesCellsOfOtherModelsEmpty) {
   brown = result.block.cameras[CameraIndex(1)].intrinsics = {1000, 500, 400, -0.1, 0, 0, 0, 0};
   export_result(result, "csv", folder.path("tables"));
   const std::string text = read_file(folder.path("tables/cameras.csv"));
-  EXPECT_THAT(text, HasSubstr("name,width,height,model,f,cx,cy,k1,k2,k3,p1,p2\n"));
-  EXPECT_THAT(text, HasSubstr(",,,,,\n"));
-  EXPECT_THAT(text, HasSubstr(",brown,1000,500,400,-0.1,0,0,0,0\n"));
+  EXPECT_THAT(text, HasSubstr("name,width,height,model,f,cx,cy,k1,k2,k3,p1,p2,b1,b2\n"));
+  EXPECT_THAT(text, HasSubstr(",,,,,,,\n"));
+  EXPECT_THAT(text, HasSubstr(",brown,1000,500,400,-0.1,0,0,0,0,0,0\n"));
 }
 
 TEST(CameraModelSimulation, ObservesByTheModel) {
