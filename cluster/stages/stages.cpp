@@ -10,6 +10,7 @@
 #include "cluster/stages/common/block_tables.h"
 #include "cluster/stages/merge/merge.h"
 #include "cluster/stages/pipeline/adjustment.h"
+#include "cluster/stages/pipeline/cameras.h"
 #include "cluster/stages/pipeline/candidates.h"
 #include "cluster/stages/pipeline/coverage.h"
 #include "cluster/stages/pipeline/matching.h"
@@ -75,6 +76,11 @@ void orientation(const Stage& stage, const Job& job, JobRecord& record, StageRes
   const auto& oriented = results.oriented.state.oriented;
   if (std::none_of(oriented.begin(), oriented.end(), [](auto o) { return o != 0; }))
     throw AgreedError<ComputeError>(why_nothing_is_oriented(job.block));
+}
+
+void cameras(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
+  run_cameras(stage, job, record, results.tiles, results.oriented.state, results.own.block);
+  return_freed_memory();
 }
 
 void adjustment(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
@@ -158,8 +164,15 @@ constexpr Stage kStages[] = {
      .kind = "orientation",
      .read_file = [](const std::string& path) { read_orientation(path); },
      .run = orientation},
+    {.name = "cameras",
+     .needs = "tracks, orientation, where a camera chooses its parameters",
+     .makes = "cameras/<rig>.txt",
+     .unit = "rig",
+     .command_given = "",
+     .optional = true,
+     .run = cameras},
     {.name = "adjustment",
-     .needs = "tiles, tracks, orientation",
+     .needs = "tiles, tracks, orientation, cameras",
      .makes = "adjust/<tile>.h5",
      .unit = "tile",
      .algorithm = 17,

@@ -37,6 +37,9 @@ struct Camera {
   // From EXIF, the sensor table or the project file; false: a guess (1.2 times the larger side).
   bool focal_known = false;
   std::string mask_path;  // PNG, black = ignore; empty = no mask
+  // Whether the block decides which parameters are estimated, and what it decided, for the report.
+  bool choose = false;
+  std::string choice;
 };
 
 // Pose of a camera in its rig. A single camera is a rig of one camera with the identity as its mount, held fixed.

@@ -121,6 +121,7 @@ void apply_calibration(const RigCalibration& calibration, bool hold, Block& bloc
       camera.intrinsics = from.intrinsics;
       camera.focal_known = true;
       camera.prior_sigma = hold ? IntrinsicSigmas{} : from.sigma;
+      camera.choose = false;  // the calibration says how well each parameter is known
     }
   for (RigIndex rig(0); block.rigs.contains(rig); ++rig.value)
     for (std::size_t m = 0; m < block.rigs[rig].mounts.size(); ++m) {

@@ -19,13 +19,13 @@ std::vector<int> parameters_named(const Camera& camera, const std::string& name,
   if (name == "focal") return {kFocal};
   if (name == "principal_point") return {kPrincipalX, kPrincipalY};
   if (const auto parameter = find_parameter(model, name)) return {*parameter};
-  if (name == "usual") {
+  if (name == "usual" || name == "auto") {
     std::vector<int> usual;
     for (int p = 0; p < parameter_count(model); ++p)
       if (contains(usual_parameters(model), p)) usual.push_back(p);
     return usual;
   }
-  std::string list = "usual, focal, principal_point";
+  std::string list = "auto, usual, focal, principal_point";
   for (int p = 0; p < parameter_count(model); ++p) list += ", " + parameter_name(model, p);
   throw InputError(where + ": calibrate: '" + name + "' is not a parameter of camera '" + camera.name + "' (model " +
                    model_name(model) + "); its parameters are " + list);
@@ -116,12 +116,17 @@ void read_values(YamlReader& reader, bool image_files, Camera& camera) {
   }
 }
 
-// Holds the parameters that `calibrate` does not free.
+bool is_auto(const YAML::Node& node) { return node.IsScalar() && node.Scalar() == "auto"; }
+
+// Holds the parameters that `calibrate` does not free. `auto`, alone or in a list, leaves the choice among them to the
+// block.
 void read_calibrate(YamlReader& reader, Camera& camera) {
   const auto calibrate = reader.node("calibrate");
+  camera.choose =
+      is_auto(*calibrate) || (calibrate->IsSequence() && std::any_of(calibrate->begin(), calibrate->end(), is_auto));
   if (calibrate->IsSequence())
     hold_except(*calibrate, reader.where("calibrate"), camera);
-  else if (!*reader.flag("calibrate"))
+  else if (!camera.choose && !*reader.flag("calibrate"))
     camera.prior_sigma.fill(0);
 }
 

@@ -68,6 +68,7 @@ OrderedJson cameras(const BlockResult& result) {
           {"sigma", number(sigmas ? std::sqrt(std::max(0.0, result.camera_covariance[c](k, k))) : kUnknown)}};
     }
     list.push_back({{"name", result.block.cameras[c].name}, {"model", model_name(model)}, {"parameters", parameters}});
+    if (!result.block.cameras[c].choice.empty()) list.back()["choice"] = result.block.cameras[c].choice;
   }
   return list;
 }

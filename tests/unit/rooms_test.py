@@ -22,7 +22,7 @@ partition/views partition/candidates partition/links partition/tiles partition/d
 match/images match/features match/nearest match/verification match/filter match/pairs match/tracks
 adjust/problem adjust/terms adjust/lanes adjust/resection adjust/tile adjust/independent_models adjust/orientation/steps adjust/orientation
 adjust/calibration adjust/registration adjust/coplanarity adjust/checks
-merge/scratch merge/plan merge/front merge/tile merge/datum merge/step merge/checks merge/tree merge/start merge/rig
+merge/scratch merge/plan merge/front merge/tile merge/datum merge/step merge/checks merge/tree merge/start merge/rig merge/camera
 cluster/process cluster/mpi cluster/job cluster/outcome
 cluster/stages/common cluster/stages/registration cluster/stages/pipeline cluster/stages/result cluster/stages/merge
 cluster/stages cluster/status cluster/terminal cluster/commands cluster/main

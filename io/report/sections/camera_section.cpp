@@ -163,6 +163,7 @@ std::string cameras_section(const BlockResult& result, const Figures& f) {
                             fixed(opening(c, k, {0.5 * c.width, 0}), 0), fixed(opening(c, k, {0, 0.5 * c.height}), 0),
                             count(f.camera_images[camera]), c.focal_known ? "" : "; focal length was a guess"),
                 "muted") +
+            (c.choice.empty() ? "" : paragraph("Chosen by the block: " + escape(c.choice) + ".")) +
             camera_table(result, camera) + correlation_table(result, camera);
   }
   if (result.block.cameras.next_index().value > listed)

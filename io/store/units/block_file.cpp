@@ -33,6 +33,8 @@ GroundFrame get_ground(const Hdf5Reader& file) {
   return ground;
 }
 
+constexpr const char *kChoose = "cameras/choose", *kChoice = "cameras/choice";
+
 void put_cameras(Hdf5Writer& file, const IndexedVector<CameraIndex, Camera>& cameras) {
   std::vector<std::int32_t> size;
   for (const Camera& camera : cameras) size.insert(size.end(), {camera.width, camera.height});
@@ -49,6 +51,10 @@ void put_cameras(Hdf5Writer& file, const IndexedVector<CameraIndex, Camera>& cam
   file.vector("cameras/focal_known", column(cameras, [](const Camera& c) -> std::uint8_t { return c.focal_known; }),
               {"", "1: from EXIF, sensor table or project file; 0: a guess"});
   file.texts("cameras/mask_path", column(cameras, [](const Camera& c) { return c.mask_path; }));
+  if (std::none_of(cameras.begin(), cameras.end(), [](const Camera& c) { return c.choose; })) return;
+  file.vector(kChoose, column(cameras, [](const Camera& c) -> std::uint8_t { return c.choose; }),
+              {"", "1: the block decides which parameters are estimated"});
+  file.texts(kChoice, column(cameras, [](const Camera& c) { return c.choice; }), {"", "what it decided, and why"});
 }
 
 IndexedVector<CameraIndex, Camera> get_cameras(const Hdf5Reader& file) {
@@ -58,6 +64,9 @@ IndexedVector<CameraIndex, Camera> get_cameras(const Hdf5Reader& file) {
   const std::vector<CameraModel> models = get_models(file, count);
   const auto known = file.vector<std::uint8_t>("cameras/focal_known", count);
   const std::vector<std::string> masks = file.texts("cameras/mask_path", count);
+  const bool any_choice = file.has(kChoose);
+  const auto choose = any_choice ? file.vector<std::uint8_t>(kChoose, count) : std::vector<std::uint8_t>(names.size());
+  const auto choice = any_choice ? file.texts(kChoice, count) : std::vector<std::string>(names.size());
   IndexedVector<CameraIndex, Camera> cameras(names.size());
   std::vector<double*> intrinsics, sigma;
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -68,6 +77,8 @@ IndexedVector<CameraIndex, Camera> get_cameras(const Hdf5Reader& file) {
     camera.intrinsics = Intrinsics(models[i]);
     camera.focal_known = known[i] != 0;
     camera.mask_path = masks[i];
+    camera.choose = choose[i] != 0;
+    camera.choice = choice[i];
     intrinsics.push_back(camera.intrinsics.data());
     sigma.push_back(camera.prior_sigma.data());
   }

@@ -19,12 +19,16 @@ inline Block example_block() {
                            {3000.1, 2000.5, 1500.25, -0.1, 0.01, 1e-3, 1e-4, -2e-4},
                            {10, 5, 5, infinity, infinity, 0, 1e-3, 1e-3},
                            true,
-                           "masks/vorn \xc3\xa4.png"});
+                           "masks/vorn \xc3\xa4.png",
+                           true,
+                           "estimated: f"});
   block.cameras.push_back({"back",
                            1920,
                            1080,
                            {*find_model("ign-radial"), {1400, 960, 540, 950, 530, -4.6e-8, 3.1e-14, 0}},
                            {},
+                           false,
+                           "",
                            false,
                            ""});
   Rig pair{"pair", {Mount{CameraIndex(0), {}, 0, 0}, Mount{CameraIndex(1), {}, 0.01, 0.002}}};

@@ -63,6 +63,18 @@ TEST(CameraModelFiles, WithoutRareParametersAreRead) {
   EXPECT_EQ(covariance(8, 8), 0);
 }
 
+TEST(CameraModelFiles, KeepTheChoiceOfParameters) {
+  ScratchDirectory folder;
+  Block block = every_camera();
+  block.cameras[CameraIndex(1)].choose = true;
+  block.cameras[CameraIndex(1)].choice = "estimated: f";
+  write_block(folder.path("block.h5"), block);
+  const Block back = read_block(folder.path("block.h5"));
+  EXPECT_TRUE(back.cameras[CameraIndex(1)].choose);
+  EXPECT_EQ(back.cameras[CameraIndex(1)].choice, "estimated: f");
+  EXPECT_FALSE(back.cameras[CameraIndex(0)].choose);
+}
+
 TEST(CameraModelFiles, KeepEveryModel) {
   ScratchDirectory folder;
   const Block block = every_camera();
@@ -115,6 +127,18 @@ TEST_F(CameraModelProject, TakesModelAndParameters) {
   for (std::size_t p = 0; p < expected.size(); ++p) EXPECT_DOUBLE_EQ(camera.prior_sigma[p], expected[p]);
 }
 
+TEST_F(CameraModelProject, ChoosesParametersWhenAsked) {
+  EXPECT_FALSE(read("    focal_px: 1400\n").choose);
+  EXPECT_TRUE(read("    calibrate: auto\n").choose);
+  const Camera affinity = read("    calibrate: [auto, b1]\n");
+  EXPECT_TRUE(affinity.choose);
+  EXPECT_GT(affinity.prior_sigma[kAffinity], 0);
+  EXPECT_EQ(affinity.prior_sigma[kSkew], 0);
+  for (const char* told : {"true", "false", "[focal]"})
+    EXPECT_FALSE(read(std::string("    calibrate: ") + told + "\n").choose) << told;
+  EXPECT_THAT(refusal("    calibrate: maybe\n"), HasSubstr("block.yaml:4"));
+}
+
 TEST_F(CameraModelProject, EstimatesAffinityWhenAsked) {
   const std::string start = "    focal_px: 1400\n    distortion: {b1: -2.5, b2: 0.5}\n";
   const Camera held = read(start), free = read(start + "    calibrate: [usual, b1, b2]\n");
@@ -144,7 +168,7 @@ TEST_F(CameraModelProject, RefusesByLine) {
               HasSubstr("block.yaml:5: unknown key 'k1'"));
   EXPECT_THAT(refusal("    model: pinhole\n    calibrate: [k1]\n"),
               AllOf(HasSubstr("block.yaml:5: calibrate: 'k1' is not a parameter of camera '"),
-                    HasSubstr("(model pinhole); its parameters are usual, focal, principal_point, f, cx, cy")));
+                    HasSubstr("(model pinhole); its parameters are auto, usual, focal, principal_point, f, cx, cy")));
   EXPECT_THAT(refusal("    model: legendre-2\n    calibrate: [width]\n"), HasSubstr("size of the image"));
   EXPECT_THAT(refusal("    model: equirectangular\n    focal_px: 300\n"), HasSubstr("block.yaml:5: the focal length"));
 }

@@ -1,0 +1,20 @@
+// Runs the stage of cameras. It makes cameras/<rig>.txt: which parameters of the cameras with `calibrate: auto` are
+// estimated, chosen from a sample of the oriented block (merge/camera/determined_parameters.h).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cluster/job/job.h"
+#include "cluster/job/job_record.h"
+#include "cluster/job/stage.h"
+#include "io/block/image_graph.h"
+
+namespace megablock {
+
+// Collective. Sets the prior sigmas of the cameras of `block` (that of the job) by the choice, and puts held parameters
+// of the state back to their start values. Does nothing where no camera asks for it.
+void run_cameras(const Stage& stage, const Job& job, JobRecord& record, const Tiles& tiles, BlockState& state,
+                 Block& block);
+
+}  // namespace megablock
