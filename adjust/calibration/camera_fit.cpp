@@ -34,7 +34,7 @@ std::vector<Sample> grid_of(const Intrinsics& given, int width, int height) {
   return samples;
 }
 
-struct Equations {
+struct FitEquations {
   Eigen::MatrixXd normal;
   Eigen::VectorXd gradient;
   double squares = 0;
@@ -42,9 +42,9 @@ struct Equations {
 };
 
 // N = sum J'J, g = sum J'r with r = project(k, ray) - pixel, over the free parameters in the order of `parameters`.
-Equations equations_of(const std::vector<Sample>& samples, const Intrinsics& k, const std::vector<int>& parameters) {
+FitEquations equations_of(const std::vector<Sample>& samples, const Intrinsics& k, const std::vector<int>& parameters) {
   const auto size = static_cast<Eigen::Index>(parameters.size());
-  Equations result{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)};
+  FitEquations result{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)};
   Eigen::MatrixXd row(2, size);
   for (const Sample& s : samples) {
     const ProjectionJacobian p = project_with_jacobian(k, s.ray);
@@ -73,7 +73,7 @@ CameraFit fit_camera(const CameraModel& model, ParameterMask free, const Intrins
   for (int p = 0; p < fit.camera.size(); ++p)
     if (contains(free, p) && !is_fixed(model, p)) parameters.push_back(p);
   const std::vector<Sample> samples = grid_of(given, width, height);
-  Equations current = equations_of(samples, fit.camera, parameters);
+  FitEquations current = equations_of(samples, fit.camera, parameters);
   double damping = 1e-6;
   for (int step = 0; step < kMaxSteps && !parameters.empty(); ++step) {
     const Eigen::VectorXd scale =
@@ -84,7 +84,7 @@ CameraFit fit_camera(const CameraModel& model, ParameterMask free, const Intrins
     Intrinsics next = fit.camera;
     for (std::size_t i = 0; i < parameters.size(); ++i)
       next[static_cast<std::size_t>(parameters[i])] += move[static_cast<Eigen::Index>(i)];
-    const Equations there = equations_of(samples, next, parameters);
+    const FitEquations there = equations_of(samples, next, parameters);
     if (move.allFinite() && (there.valid || !current.valid) && there.squares < current.squares) {
       const bool settled = current.squares - there.squares < 1e-10 * current.squares;
       fit.camera = next;

@@ -11,7 +11,7 @@
 // that agree with them, until they no longer change.
 //
 // The first orientation of a block is bent by some pixels, and by more in long strips. A point agrees within
-// max(kMark_px, kAgree s), with s^2 the mean of the h smallest squares.
+// max(kControlMark_px, kAgree s), with s^2 the mean of the h smallest squares.
 #include "adjust/orientation/control_alignment.h"
 
 #include <algorithm>
@@ -19,7 +19,9 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 
+#include "adjust/orientation/steps/control_marks.h"
 #include "adjust/orientation/steps/levelling.h"
 #include "adjust/orientation/straight_line.h"
 #include "adjust/tile/consistent_rays.h"
@@ -32,8 +34,7 @@ namespace megablock {
 
 namespace {
 
-constexpr double kMark_px = 10;  // marks of a point meet within it in the first orientation (orientation.cpp, adjust())
-constexpr double kAgree = 4;     // times the rms of the best points
+constexpr double kAgree = 4;                // times the rms of the best points
 constexpr std::size_t kMostSamples = 4000;  // all samples of three among 29 points
 
 // A control point as the block sees it.
@@ -88,15 +89,9 @@ class ControlAligner {
           std::isfinite(point.position[axis]) && point.sigma[axis] < kUnknownHeightSigma;
       if (seen.known[static_cast<std::size_t>(axis)]) seen.ground[axis] = point.position[axis];
     }
-    for (const ImageMeasurement& mark : point.measurements) {
-      const Image& image = block_.images[mark.image];
-      if (!std::binary_search(frames_.begin(), frames_.end(), image.frame) || !state_.oriented[image.frame]) continue;
-      const Pose& mount = state_.mounts[block_.frames[image.frame].rig][static_cast<std::size_t>(image.mount)];
-      seen.marks.push_back({camera_pose(state_.frames[image.frame], mount),
-                            &state_.cameras[block_.camera_of(mark.image)], mark.pixel, 1});
-    }
-    // The seed only matters for more than nine marks.
-    if (const auto rays = find_consistent_rays(seen.marks, kMark_px, 1)) seen.model = rays->point;
+    SeenMarks marks = see_marks(block_, state_, frames_, point);
+    seen.marks = std::move(marks.marks);
+    seen.model = marks.place;
     const bool all_known = seen.known[0] && seen.known[1] && seen.known[2];
     if (seen.model ? (seen.place() || seen.height()) : (all_known && !seen.marks.empty()))
       points_.push_back(std::move(seen));
@@ -131,7 +126,7 @@ class ControlAligner {
     return sum;
   }
   double limit_of(const Similarity& similarity) const {
-    return std::max(kMark_px, kAgree * std::sqrt(trimmed_squares(similarity) / static_cast<double>(decisive())));
+    return std::max(kControlMark_px, kAgree * std::sqrt(trimmed_squares(similarity) / static_cast<double>(decisive())));
   }
 
   void propose(const Similarity& similarity) {

@@ -29,7 +29,7 @@ constexpr std::size_t kFewestOfPart = 3, kFewestAgreeing = 30;
 constexpr double kAgreeingShare = 0.3;
 
 // The number of tracks that two frames, or two sets of frames, both observe, and of those that both keep.
-struct Agreement {
+struct PartAgreement {
   std::int64_t shared = 0, kept = 0;
   bool hangs_together() const {
     constexpr std::int64_t kFewestShared = 10;
@@ -37,7 +37,7 @@ struct Agreement {
   }
 };
 using FramePair = std::pair<std::int64_t, std::int64_t>;  // ascending
-using Agreements = std::map<FramePair, Agreement>;
+using Agreements = std::map<FramePair, PartAgreement>;
 
 std::int32_t frame_of(const TileProblem& problem, std::int64_t row) {
   return problem.images[problem.image[row].value].frame.value;
@@ -65,7 +65,7 @@ Agreements agreements_of_frames(const TileProblem& problem) {
   std::sort(pairs.begin(), pairs.end());
   Agreements sums;
   for (const auto& [pair, kept] : pairs) {
-    Agreement& sum = sums.emplace_hint(sums.end(), pair, Agreement())->second;
+    PartAgreement& sum = sums.emplace_hint(sums.end(), pair, PartAgreement())->second;
     ++sum.shared;
     sum.kept += kept;
   }
@@ -86,7 +86,7 @@ std::vector<std::vector<std::int64_t>> parts_of(const TileProblem& problem) {
     for (const auto& [pair, agreement] : open) {
       const std::int64_t a = sets.find(pair.first), b = sets.find(pair.second);
       if (a == b) continue;
-      Agreement& sum = between[std::minmax(a, b)];
+      PartAgreement& sum = between[std::minmax(a, b)];
       sum.shared += agreement.shared;
       sum.kept += agreement.kept;
     }

@@ -36,7 +36,7 @@ struct VerticalsOptions {
 };
 
 // Part of the key of an image's row; raised when results change.
-constexpr int kAlgorithm = 1;
+constexpr int kVerticalsAlgorithm = 1;
 
 // An attitude belongs to the sensor. Its mounting, and the edges of buildings, are off by this much.
 constexpr double kLeastSensorSigma = 2 * kDegree;
@@ -119,7 +119,7 @@ std::uint64_t key_of(const Block& block, ImageIndex i, const VerticalPrior& prio
                      const SegmentOptions& segments) {
   const Camera& camera = block.cameras[block.camera_of(i)];
   Hasher hasher;
-  hasher.add(kAlgorithm).add(block.name_of(i)).add(block.images[i].file_hash).add(mask);
+  hasher.add(kVerticalsAlgorithm).add(block.name_of(i)).add(block.images[i].file_hash).add(mask);
   hasher.add(camera.width).add(camera.height);
   add_to_hash(hasher, camera.intrinsics);
   for (const double sigma : camera.prior_sigma) hasher.add(sigma);

@@ -33,7 +33,8 @@ struct RunOptions {
 };
 
 // The block of a run, and its large tables outside of memory. It changes between stages alone: names come and go, the
-// orientation sets verticals aside, `register` puts an estimated rig in, and the merge moves it into the result.
+// orientation sets verticals aside and moves positions onto the control, `register` puts an estimated rig in, and the
+// merge moves it into the result.
 struct JobBlock {
   Block block;
   PagedTables tables;

@@ -245,7 +245,7 @@ void calibrate_rigs(const Job& job, JobRecord& record, JobBlock& own, const std:
   BlockState start =
       source.matches.empty()
           ? initial_state(job.block)
-          : run_orientation(*find_stage(kOrientationStage), job, record, source.matches, own.block.verticals).state;
+          : run_orientation(*find_stage(kOrientationStage), job, record, source.matches, own.block).state;
   if (settings.rig.mode != CalibrationMode::kOnLine) resect_missing(job.block, start);
   TrackSet tracks;
   tracks.begin.push_back(0);

@@ -70,7 +70,7 @@ void orientation(const Stage& stage, const Job& job, JobRecord& record, StageRes
   return_freed_memory();  // memory of the tracks
   job.tables.release();
   if (orients_by_names(job.block)) restore_names(job.store, results.own);
-  results.oriented = run_orientation(stage, job, record, results.matches, results.own.block.verticals);
+  results.oriented = run_orientation(stage, job, record, results.matches, results.own.block);
   release_names(results.own);
   job.tables.release();
   const auto& oriented = results.oriented.state.oriented;

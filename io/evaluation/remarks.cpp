@@ -11,6 +11,7 @@
 #include "io/block/held_priors.h"
 #include "io/evaluation/figures.h"
 #include "io/evaluation/parts.h"
+#include "io/evaluation/position_groups.h"
 #include "io/evaluation/used_sigmas.h"
 #include "io/result/result_option.h"
 #include "io/text/counted.h"
@@ -475,6 +476,8 @@ std::vector<std::string> remarks(const BlockResult& result, const report::Figure
   std::vector<std::string> lines = datum_texts(result, figures);
   for (std::string& text : misstated_texts(result)) lines.push_back(std::move(text));
   for (std::string& text : contradicted_texts(result, figures)) lines.push_back(std::move(text));
+  if (std::string text = position_groups_text(result, figures.positions); !text.empty())
+    lines.push_back(std::move(text));
   if (std::string text = near_limit_text(result, figures); !text.empty()) lines.push_back(std::move(text));
   for (std::string& text : wrong_control_texts(result)) lines.push_back(std::move(text));
   for (const PointRole role : {PointRole::kControl, PointRole::kCheck})

@@ -32,7 +32,7 @@ const std::vector<ImportFormat>& readers() {
   return all;
 }
 
-constexpr const char* kProject =
+constexpr const char* kImportedProject =
     "# Imported block; all keys: reference/project-file.md in share/doc/megablock/docs of the installation\n"
     "block: given.h5\ntie_points: tie_points.h5\n";
 
@@ -40,7 +40,7 @@ constexpr const char* kProject =
 void refuse_other_project(const fs::path& path) {
   if (!fs::exists(path)) return;
   std::ifstream file(path);
-  if (std::string(std::istreambuf_iterator<char>(file), {}) != kProject)
+  if (std::string(std::istreambuf_iterator<char>(file), {}) != kImportedProject)
     throw InputError(path.string() +
                      ": this project file exists and differs from that of the import: it was edited, or belongs to "
                      "another block; name another folder with -o, or move it away");
@@ -64,7 +64,7 @@ void write_imported(const ImportedBlock& imported, const std::string& folder) {
   write_block((root / "given.h5").string(), imported.block);
   write_tracks((root / "tie_points.h5").string(), imported.tracks);
   TextWriter project((root / "block.yaml").string());
-  project.print("{}", kProject);
+  project.print("{}", kImportedProject);
   project.close();
 }
 

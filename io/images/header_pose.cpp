@@ -25,18 +25,18 @@ constexpr PositionTags kPositions[] = {{"drone-dji", "GpsLatitude", "GpsLongitud
                                        {"exif", "GPSLatitude", "GPSLongitude", "GPSAltitude"}};
 
 // Names of attitudes in XMP, and the kind of their angles.
-enum class Angles : std::uint8_t { kGimbal, kPix4d };
+enum class HeaderAngles : std::uint8_t { kGimbal, kPix4d };
 struct AttitudeTags {
   const char *prefix, *yaw, *pitch, *roll;
-  Angles angles;
+  HeaderAngles angles;
 };
 constexpr AttitudeTags kAttitudes[] = {
-    {"drone-dji", "GimbalYawDegree", "GimbalPitchDegree", "GimbalRollDegree", Angles::kGimbal},
-    {"drone-parrot", "CameraYawDegree", "CameraPitchDegree", "CameraRollDegree", Angles::kGimbal},
+    {"drone-dji", "GimbalYawDegree", "GimbalPitchDegree", "GimbalRollDegree", HeaderAngles::kGimbal},
+    {"drone-parrot", "CameraYawDegree", "CameraPitchDegree", "CameraRollDegree", HeaderAngles::kGimbal},
     {"drone-skydio", "CameraOrientationNED/drone-skydio:Yaw", "CameraOrientationNED/drone-skydio:Pitch",
-     "CameraOrientationNED/drone-skydio:Roll", Angles::kGimbal},
-    {"drone", "GimbalYawDegree", "GimbalPitchDegree", "GimbalRollDegree", Angles::kGimbal},
-    {"Camera", "Yaw", "Pitch", "Roll", Angles::kPix4d}};
+     "CameraOrientationNED/drone-skydio:Roll", HeaderAngles::kGimbal},
+    {"drone", "GimbalYawDegree", "GimbalPitchDegree", "GimbalRollDegree", HeaderAngles::kGimbal},
+    {"Camera", "Yaw", "Pitch", "Roll", HeaderAngles::kPix4d}};
 
 constexpr double kGimbalDoubtDeg = 20;
 
@@ -119,16 +119,17 @@ void read_sigmas(const ExifFields& exif, const XmpFields& xmp, ImageHeader& head
   header.position_sigma_vertical_m = vertical;
 }
 
-// The angles of a gimbal are those of the camera. Angles of the flight are those of the body and say nothing about a
-// camera on a gimbal. For a fixed camera they would need the assumption that it looks along the body's z axis, so they
-// are not used alone.
+// The angles of a gimbal are those of the camera. HeaderAngles of the flight are those of the body and say nothing
+// about a camera on a gimbal. For a fixed camera they would need the assumption that it looks along the body's z axis,
+// so they are not used alone.
 void read_attitude(const XmpFields& xmp, ImageHeader& header) {
   for (const AttitudeTags& tags : kAttitudes) {
     const double yaw = xmp.number(tags.prefix, tags.yaw) * kDegree;
     const double pitch = xmp.number(tags.prefix, tags.pitch) * kDegree;
     double roll = xmp.number(tags.prefix, tags.roll) * kDegree;
     if (std::isnan(yaw) || std::isnan(pitch) || std::isnan(roll)) continue;
-    const bool gimbal = tags.angles == Angles::kGimbal || std::abs(pitch + 90 * kDegree) < kGimbalDoubtDeg * kDegree;
+    const bool gimbal =
+        tags.angles == HeaderAngles::kGimbal || std::abs(pitch + 90 * kDegree) < kGimbalDoubtDeg * kDegree;
     if (!gimbal && lower_case(header.make) == "sensefly") roll = -roll;
     header.attitude = {
         gimbal ? rotation_from(YawPitchRoll{yaw, pitch, roll}) : rotation_from(BodyAttitude{yaw, pitch, roll}),

@@ -23,7 +23,7 @@ UpdateMatrix condense(const TileProblem& problem, const TileState& state) {
   }
   const TilePlan plan = make_tile_plan(problem, node);
   const BlockGauge gauge = make_gauge({tile_gauge(problem, plan, state)});
-  return condense_tile(problem, plan, state, 0, tile_datum(gauge, 0, problem, plan, state, false)).update;
+  return condense_tile(problem, plan, state, 0, tile_datum(gauge, 0, problem, plan, state, DatumColumns::kNone)).update;
 }
 
 Eigen::VectorXd present_values(const TileProblem& problem, const TileState& state) {

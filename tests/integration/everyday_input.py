@@ -5,6 +5,7 @@ usage: everyday_input.py MEGABLOCK [unittest arguments]
 Each case is one of shared/data/hard, made from a small rendered block.
 """
 import json
+import re
 import unittest
 
 import pictures
@@ -64,6 +65,27 @@ class EverydayInput(CopyOfTheBlock):
         said = self.run_job()
         self.assertIn("1 measurement is not used, because the block has no image 'IMG_9999.jpg'", said)
         self.assert_all_oriented()
+
+    def test_positions_47_m_above_the_control_are_moved_onto_it(self):
+        simulate("offset", 12, 480, 360, "--control-points", 8, "--gps-sigma", 0.02)
+        self.folder = work / "offset"
+        self.project, self.job = self.folder / "block.yaml", self.folder / "job"
+        control = self.folder / "gcp_list.txt"
+        head, *rows = [line.split() for line in control.read_text().splitlines()]
+        rows = [[x, y, str(float(z) - 47), *rest] for x, y, z, *rest in rows]
+        control.write_text("\n".join(" ".join(row) for row in [head, *rows]))
+        check = sorted({row[6] for row in rows})[:2]
+        self.write_project(f"control: {{file: gcp_list.txt, check: [{', '.join(check)}]}}\n")
+        self.run_job()
+        self.assert_all_oriented()
+        state = status(self.job)
+        found = re.search(r"the positions lie ([0-9.]+) m above the control points \(sigma ([0-9.]+) m, [0-9]+ points\)",
+                          " ".join(state["notes"]))
+        self.assertIsNotNone(found, state["notes"])
+        self.assertAlmostEqual(float(found[1]), 47, delta=0.1)
+        self.assertGreaterEqual(state["check_points"]["compared"], 1)
+        self.assertLess(state["check_points"]["normalised_error"], 3)
+        self.assertLess(state["check_points"]["rms_vertical_m"], 0.2)
 
     def test_positions_without_heights_leave_the_tilt_and_end(self):
         lines = ["EPSG:4326"]

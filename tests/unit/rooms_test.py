@@ -89,6 +89,19 @@ problems += [f"{folder}/ holds {count} files of code, at most {MOST_FILES} are a
              for folder, count in files.items() if count > MOST_FILES]
 problems += [f"{folder}/ is in the list of folders but holds no code" for folder in FOLDERS if not files[folder]]
 
+# The files of a room are compiled in batches that change with every file that is added: names in their unnamed
+# namespaces must differ.
+unnamed = re.compile(r"^namespace \{$(.*?)^\}  // namespace$", re.S | re.M)
+named = re.compile(r"^(?:enum class|struct|class) (\w+)[^;]*?\{|^constexpr [^=;(]*?\b(k\w+)\b", re.M)
+for room in ROOMS:
+    first = {}
+    for path in sorted((source / room).rglob("*.cpp")):
+        for part in unnamed.findall(path.read_text()):
+            for name in {match.group(1) or match.group(2) for match in named.finditer(part)}:
+                other = first.setdefault(name, path)
+                if other != path:
+                    problems.append(f"{path}: the unnamed namespace of {other} has a '{name}' too")
+
 # Tests run side by side: none may name a place in the temporary folder, each gets one of its own.
 names_a_place = re.compile(r"TempDir\(|temp_directory_path\(")
 for path in sorted((source / "tests").rglob("*")):

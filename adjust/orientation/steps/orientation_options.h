@@ -9,12 +9,13 @@ namespace megablock {
 
 struct OrientationOptions {
   ObservationOptions observations;
-  double max_rotation_error_deg = 10;  // relative rotations farther from the average are dropped
-  int min_points_per_image = 15;       // an image with fewer triangulated points is not oriented
-  std::int64_t tracks_per_pair = 120;  // longest tracks used for positioning (bounds memory)
-  int part_frames = 0;                 // larger components without any position are oriented in parts of so many frames
-                                       // (orientation_parts.h); 0: always as a whole
-  void check() const;                  // throws InputError
+  double max_rotation_error_deg = 10;     // relative rotations farther from the average are dropped
+  int min_points_per_image = 15;          // an image with fewer triangulated points is not oriented
+  std::int64_t tracks_per_pair = 120;     // longest tracks used for positioning (bounds memory)
+  bool move_positions_to_control = true;  // remove an offset of the positions from the control (position_offset.h)
+  int part_frames = 0;  // larger components without any position are oriented in parts of so many frames
+                        // (orientation_parts.h); 0: always as a whole
+  void check() const;   // throws InputError
 };
 
 }  // namespace megablock

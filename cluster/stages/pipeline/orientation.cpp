@@ -13,6 +13,7 @@
 #include "adjust/orientation/control_alignment.h"
 #include "adjust/orientation/given_trajectories.h"
 #include "adjust/orientation/orientation.h"
+#include "adjust/orientation/position_offset.h"
 #include "adjust/orientation/vertical_check.h"
 #include "cluster/job/messages.h"
 #include "cluster/job/work_queue.h"
@@ -215,41 +216,57 @@ void unite_frames(const Block& block, const std::vector<VerifiedPair>& pairs, Di
   for (const VerifiedPair& pair : pairs) sets.unite(block.images[pair.a].frame.value, block.images[pair.b].frame.value);
 }
 
-// Moves the parts of the block that have neither positions nor given poses onto the control points.
-void move_onto_control(const Stage& stage, const Job& job, JobRecord& record, DisjointSets& sets, BlockState& state) {
+// Moves a part of the block that has neither positions nor given poses onto the control points.
+void align_part(const Stage& stage, const Job& job, JobRecord& record, const std::vector<FrameIndex>& frames,
+                BlockState& state) {
+  const auto aligned = align_with_control(job.block, state, frames);
+  if (!aligned) return;
+  move_frames(aligned->similarity, frames, state);
+  say(job, stage.name,
+      fmt::format("{} moved onto the control: {} of {} fit within {:.1f} px (median){}",
+                  counted(std::ssize(frames), "frame"), aligned->agreeing, counted(aligned->points, "control point"),
+                  aligned->median_residual_px,
+                  aligned->on_a_line ? "; they lie on one line, so that the viewing directions level the block" : ""));
+  if (aligned->on_a_line)
+    record.notes.push_back(
+        "the control points lie on one line: the tilt of the block about it follows from the viewing directions of "
+        "the images alone; add a control point off the line, positions or attitudes");
+}
+
+// Moves the parts of the block onto the control points: those without positions by a similarity, and those whose
+// positions contradict the control by one offset, together with these positions.
+void move_onto_control(const Stage& stage, const Job& job, JobRecord& record, DisjointSets& sets, Block& own,
+                       BlockState& state) {
   const Block& block = job.block;
   if (std::ranges::none_of(block.control_points, [](const auto& p) { return p.role == PointRole::kControl; })) return;
   std::map<std::int64_t, std::vector<FrameIndex>> parts;
-  std::set<std::int64_t> placed;
+  std::set<std::int64_t> with_positions, with_given_poses;
   for (FrameIndex f(0); block.frames.contains(f); ++f.value) {
     if (!state.oriented[f]) continue;
     const std::int64_t part = sets.find(f.value);
     parts[part].push_back(f);
     const Frame& frame = block.frames[f];
-    if (frame.given_pose || (job.settings.adjustment.observations.use_position_priors && frame.position_prior))
-      placed.insert(part);
+    if (frame.given_pose) with_given_poses.insert(part);
+    if (job.settings.adjustment.observations.use_position_priors && frame.position_prior) with_positions.insert(part);
   }
   for (const auto& [part, frames] : parts) {
-    if (placed.contains(part)) continue;
-    const auto aligned = align_with_control(block, state, frames);
-    if (!aligned) continue;
-    move_frames(aligned->similarity, frames, state);
-    say(job, stage.name,
-        fmt::format(
-            "{} moved onto the control: {} of {} fit within {:.1f} px (median){}", counted(std::ssize(frames), "frame"),
-            aligned->agreeing, counted(aligned->points, "control point"), aligned->median_residual_px,
-            aligned->on_a_line ? "; they lie on one line, so that the viewing directions level the block" : ""));
-    if (aligned->on_a_line)
-      record.notes.push_back(
-          "the control points lie on one line: the tilt of the block about it follows from the viewing directions of "
-          "the images alone; add a control point off the line, positions or attitudes");
+    if (with_given_poses.contains(part)) continue;
+    if (!with_positions.contains(part)) {
+      align_part(stage, job, record, frames, state);
+    } else if (job.settings.orientation.move_positions_to_control) {
+      const auto offset = find_position_offset(block, state, frames);
+      if (!offset) continue;
+      remove_offset(*offset, frames, own.frames, state);
+      add_note(job, record, stage.name, offset_text(*offset));
+    }
   }
 }
 
 }  // namespace
 
 OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& record,
-                                 const std::vector<std::string>& matches, std::vector<SeenVertical>& verticals) {
+                                 const std::vector<std::string>& matches, Block& own) {
+  std::vector<SeenVertical>& verticals = own.verticals;
   BlockState start = initial_state(job.block);
   const std::size_t all = verticals.size();
   std::vector<SetAsideVertical> aside;
@@ -297,7 +314,7 @@ OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& 
   }
   tell_of_verticals(stage, job, record, aside, all);
   state = held_in_place(job, grow(state, job.block));
-  move_onto_control(stage, job, record, connected, state);
+  move_onto_control(stage, job, record, connected, own, state);
   return made;
 }
 

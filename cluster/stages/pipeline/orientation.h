@@ -16,9 +16,10 @@ struct OrientationStage {
   std::map<FrameIndex, std::string> not_oriented;  // frames without a pose, and why
 };
 
-// Collective. `verticals`: those of the job's block; the ones that are set aside leave it.
+// Collective. `own` is the job's block. Verticals that are set aside leave it, and positions with an offset from the
+// control are moved (position_offset.h).
 OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& record,
-                                 const std::vector<std::string>& matches, std::vector<SeenVertical>& verticals);
+                                 const std::vector<std::string>& matches, Block& own);
 
 // The message for a block of which no image could be oriented: the likely cause and the remedy.
 std::string why_nothing_is_oriented(const Block& block);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kLargestStep = 3;  // s, of the offset between header and exposure within a file
 constexpr double kSameTime = 1.2;   // s, of an exposure and its image: headers have whole seconds
-constexpr double kEnough = 0.9, kRival = 0.8;
+constexpr double kEnoughExposures = 0.9, kRival = 0.8;
 constexpr double kPathGap = 5, kCubicSpan = 4;  // s
 constexpr double kSameEvent = 0.1;              // s
 constexpr double kQuarter = 900;                // s, the step of time zones
@@ -145,7 +145,7 @@ std::vector<std::int64_t> rows_by_time(const PositionTable& table, const std::ve
   for (std::size_t i = 0; i < std::min<std::size_t>(3, clocks.size()); ++i)
     for (const double exposure : exposures) attempt(exposure - clocks[i]);
   const double possible = static_cast<double>(std::min(exposures.size(), clocks.size()));
-  if (static_cast<double>(best.pairs) < kEnough * possible) refuse("their times do not fit");
+  if (static_cast<double>(best.pairs) < kEnoughExposures * possible) refuse("their times do not fit");
   if (static_cast<double>(rival) > kRival * static_cast<double>(best.pairs)) refuse("their times fit in several ways");
   std::vector<std::int64_t> rows(images.size());
   for (std::size_t i = 0; i < order.size(); ++i) rows[order[i]] = best.rows[i];
@@ -235,7 +235,7 @@ std::vector<double> times_on_path(const PositionTable& path, const std::vector<I
       const double time = image.clock_s - zone + leap_seconds(image.clock_s);
       return time >= first.time_s - 1 && time <= last.time_s + 1;
     });
-    if (static_cast<double>(on_path) >= kEnough * static_cast<double>(timed)) zones.push_back(zone);
+    if (static_cast<double>(on_path) >= kEnoughExposures * static_cast<double>(timed)) zones.push_back(zone);
   }
   if (timed == 0 || zones.size() != 1)
     throw InputError(file + ": " +

@@ -16,12 +16,12 @@ constexpr std::size_t kListedImages = 1500;  // largest number of listed images
 constexpr std::size_t kOpen = 40;            // a longer table is folded
 
 // The optional columns that have values in this block.
-struct Columns {
+struct ImageColumns {
   bool camera, tile, part, records, sigmas;
   LengthUnit sigma_unit;
 };
 
-Columns columns_of(const BlockResult& result, const Figures& f) {
+ImageColumns columns_of(const BlockResult& result, const Figures& f) {
   double most = 0;
   for (const Spread* s : {&f.sigma_east, &f.sigma_north, &f.sigma_up})
     if (std::isfinite(s->p95)) most = std::max(most, s->p95);
@@ -29,7 +29,7 @@ Columns columns_of(const BlockResult& result, const Figures& f) {
           !result.image_records.empty(),   std::isfinite(f.sigma_east.median), length_unit(most)};
 }
 
-Table empty_table(const Columns& columns) {
+Table empty_table(const ImageColumns& columns) {
   std::vector<std::string> headings = {"image"};
   if (columns.camera) headings.push_back("camera");
   const std::size_t texts = headings.size();
@@ -60,7 +60,8 @@ void add_sigmas(const BlockResult& result, FrameIndex frame, const LengthUnit& u
   cells.push_back(sigma_text(std::sqrt(variance.head<3>().maxCoeff()) * kDegreesPerRadian));
 }
 
-void add_image(const BlockResult& result, const Figures& f, const Columns& columns, ImageIndex image, Table& table) {
+void add_image(const BlockResult& result, const Figures& f, const ImageColumns& columns, ImageIndex image,
+               Table& table) {
   const Image& i = result.block.images[image];
   std::vector<std::string> cells = {escape(result.block.name_of(image))};
   if (columns.camera) cells.push_back(escape(result.block.cameras[result.block.camera_of(image)].name));
@@ -102,7 +103,7 @@ std::string images_section(const BlockResult& result, const Figures& f, const st
   constexpr std::size_t kAtATime = 64;  // images between two calls of after_reading; their rows are spread over tables
   const std::vector<ImageIndex> images = listed_images(result, f, after_reading);
   if (images.empty() || f.reprojection.oriented_images == 0) return "";
-  const Columns columns = columns_of(result, f);
+  const ImageColumns columns = columns_of(result, f);
   Table table = empty_table(columns);
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (i % kAtATime == 0) after_reading();

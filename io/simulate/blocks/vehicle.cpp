@@ -11,7 +11,7 @@ namespace megablock {
 namespace {
 
 // The place of a camera in the rig. The rig axes are x right, y down, z ahead; yaw is to the right, pitch upwards.
-struct Placing {
+struct VehiclePlacing {
   int id;
   double yaw_deg, pitch_deg;
   Eigen::Vector3d centre;  // metres
@@ -23,9 +23,9 @@ Eigen::Vector3d on_head(double yaw_deg, double up) {
 }
 
 // The cameras in the order in which larger rigs add them.
-std::vector<Placing> places() {
+std::vector<VehiclePlacing> places() {
   const auto head = [](int id, double yaw, double pitch) {
-    return Placing{id, yaw, pitch, on_head(yaw, pitch > 0 ? 0.15 : 0)};
+    return VehiclePlacing{id, yaw, pitch, on_head(yaw, pitch > 0 ? 0.15 : 0)};
   };
   return {head(22, 0, 0),
           head(42, 180, 0),
@@ -45,7 +45,7 @@ std::vector<Placing> places() {
           {62, 90, -20, {0.6, 0.5, 0}}};
 }
 
-Pose nominal_mount(const Placing& place) {
+Pose nominal_mount(const VehiclePlacing& place) {
   const double yaw = kDegree * place.yaw_deg, pitch = kDegree * place.pitch_deg;
   // The rows of R are the axes of the camera in axes of the rig; down = ahead x right.
   const Eigen::Vector3d right(std::cos(yaw), 0, -std::sin(yaw));
@@ -95,13 +95,13 @@ CameraIndex add_camera(const SimulationOptions& options, const std::string& name
 }  // namespace
 
 void add_vehicle(const SimulationOptions& options, Layout& layout) {
-  std::vector<Placing> chosen = places();
+  std::vector<VehiclePlacing> chosen = places();
   chosen.resize(static_cast<std::size_t>(options.rig_cameras));
-  std::sort(chosen.begin(), chosen.end(), [](const Placing& a, const Placing& b) { return a.id < b.id; });
+  std::sort(chosen.begin(), chosen.end(), [](const VehiclePlacing& a, const VehiclePlacing& b) { return a.id < b.id; });
   Rig rig;
   rig.name = "stereopolis";
   std::vector<Pose> truth;
-  for (const Placing& place : chosen) {
+  for (const VehiclePlacing& place : chosen) {
     std::string name("c");
     name.append(std::to_string(place.id));
     // Each camera has a stream by its name, so that a smaller rig is a part of a larger one.

@@ -1,0 +1,116 @@
+#include "adjust/orientation/position_offset.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "adjust/orientation/steps/control_marks.h"
+#include "geometry/numbers/median.h"
+#include "io/block/held_priors.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr std::size_t kFewestPoints = 3;
+constexpr double kOfSigma = 5, kOfScatter = 3;          // times these an offset counts
+constexpr double kNormal = 1.4826, kOfMedian = 1.2533;  // sigma over median of |r|; sigma of a median
+constexpr double kControlDecides = 3;                   // sigmas of the offset
+constexpr double kKnown = kUnknownHeightSigma / 2;      // metres
+
+bool has_position(const Block& block, const BlockState& state, FrameIndex frame) {
+  return state.oriented[frame] && block.frames[frame].position_prior.has_value();
+}
+
+// One coordinate of the offset, its scatter and its sigma.
+struct Difference {
+  double offset = 0, scatter = 0, sigma = 0;
+};
+
+Difference difference_of(const std::vector<double>& differences, std::vector<double> sigmas) {
+  Difference found;
+  found.offset = median(differences);
+  std::vector<double> rest;
+  for (const double d : differences) rest.push_back(std::abs(d - found.offset));
+  found.scatter = kNormal * median(std::move(rest));
+  found.sigma = kOfMedian * std::max(found.scatter, median(std::move(sigmas))) /
+                std::sqrt(static_cast<double>(differences.size()));
+  return found;
+}
+
+}  // namespace
+
+std::optional<PositionOffset> find_position_offset(const Block& block, const BlockState& state,
+                                                   const std::vector<FrameIndex>& frames) {
+  std::array<std::vector<double>, 3> position_sigmas, differences, control_sigmas;
+  for (const FrameIndex frame : frames) {
+    if (!has_position(block, state, frame)) continue;
+    const PositionPrior& prior = *block.frames[frame].position_prior;
+    if (held(prior)) return std::nullopt;
+    for (std::size_t k = 0; k < 3; ++k)
+      if (const double sigma = prior.sigma[static_cast<int>(k)]; sigma < kKnown) position_sigmas[k].push_back(sigma);
+  }
+  for (const ControlPoint& point : block.control_points) {
+    if (point.role != PointRole::kControl) continue;
+    const SeenMarks seen = see_marks(block, state, frames, point);
+    if (!seen.place) continue;
+    for (int k = 0; k < 3; ++k) {
+      if (!std::isfinite(point.position[k]) || !(point.sigma[k] < kKnown)) continue;
+      differences[static_cast<std::size_t>(k)].push_back((*seen.place)[k] - point.position[k]);
+      control_sigmas[static_cast<std::size_t>(k)].push_back(point.sigma[k]);
+    }
+  }
+  PositionOffset found;
+  for (int k = 0; k < 3; ++k) {
+    const auto axis = static_cast<std::size_t>(k);
+    const auto count = static_cast<double>(position_sigmas[axis].size());
+    if (differences[axis].size() < kFewestPoints || position_sigmas[axis].empty()) continue;
+    const Difference d = difference_of(differences[axis], control_sigmas[axis]);
+    const double sigma = median(position_sigmas[axis]);
+    if (std::abs(d.offset) < kOfSigma * std::hypot(d.sigma, sigma) || std::abs(d.offset) < kOfScatter * d.scatter)
+      continue;
+    found.offset[k] = d.offset;
+    found.sigma[k] = d.sigma;
+    found.before[k] = sigma;
+    found.after[k] = std::hypot(sigma, kControlDecides * d.sigma * std::sqrt(count));
+    found.points = std::max(found.points, std::ssize(differences[axis]));
+  }
+  if (found.offset.isZero(0)) return std::nullopt;
+  return found;
+}
+
+void remove_offset(const PositionOffset& offset, const std::vector<FrameIndex>& frames,
+                   IndexedVector<FrameIndex, Frame>& positions, BlockState& state) {
+  for (const FrameIndex frame : frames) {
+    if (state.oriented[frame]) state.frames[frame].centre -= offset.offset;
+    auto& prior = positions[frame].position_prior;
+    if (!prior) continue;
+    prior->position -= offset.offset;
+    const Eigen::Vector3d raised = (offset.after.cwiseAbs2() - offset.before.cwiseAbs2()).cwiseMax(0);
+    prior->sigma = (prior->sigma.cwiseAbs2() + raised).cwiseSqrt();
+  }
+}
+
+std::string offset_text(const PositionOffset& found) {
+  constexpr std::array<std::array<const char*, 2>, 3> kSides{
+      {{"east of", "west of"}, {"north of", "south of"}, {"above", "below"}}};
+  std::vector<std::string> parts;
+  for (int k = 0; k < 3; ++k)
+    if (found.offset[k] != 0)
+      parts.push_back(fmt::format("{:.2f} m {}", std::abs(found.offset[k]),
+                                  kSides[static_cast<std::size_t>(k)][found.offset[k] < 0 ? 1 : 0]));
+  std::string where = parts.front();
+  for (std::size_t i = 1; i < parts.size(); ++i) where += (i + 1 == parts.size() ? " and " : ", ") + parts[i];
+  const bool of_heights = parts.size() == 1 && found.offset.z() != 0;
+  return fmt::format(
+      "the positions lie {} the control points (sigma {:.2f} m, {} points): {}; they are moved onto the control, and "
+      "their sigmas are raised from {:.2g} to {:.2g} m, as the offset is no better known "
+      "('orientation: {{move_positions_to_control: false}}' leaves them)",
+      where, found.sigma.maxCoeff(), found.points,
+      of_heights ? "ellipsoidal and orthometric heights?" : "coordinates of two systems?", found.before.maxCoeff(),
+      found.after.maxCoeff());
+}
+
+}  // namespace megablock

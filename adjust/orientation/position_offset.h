@@ -1,0 +1,56 @@
+// Finds the offset of the positions of a block from its control points, as between ellipsoidal and orthometric heights.
+//
+// Positions and control in two systems contradict each other by the same vector everywhere. The adjustment would ignore
+// the smaller party as outliers: positions of an RTK receiver leave control no chance, and the block is 47 m off. The
+// block has the datum of its positions once it is oriented. There the marks of control point i meet in X_i, and
+// coordinate k of the offset is
+//
+//     o_k = med d_ik,   d_i = X_i - G_i,   s_k = 1.4826 med |d_ik - o_k|,   sigma_k = 1.2533 max(s_k, q_k) / sqrt(n),
+//
+// with G_i the given coordinates and q_k the median of their sigmas. The medians stand the outliers of nearly half of
+// the n points. A coordinate counts when it is five times its own sigma and that of a position together, and three
+// times the scatter s_k: what differs by less is left to the weights, and what differs from point to point is a bend of
+// the block, and no offset.
+//
+// The control decides on the datum: block and positions are moved by -o. Thereafter the positions know the datum only
+// through the control, which must not count twice. N positions of sigma p give a coordinate of the datum to p /
+// sqrt(N). Their sigmas are raised until this is three times sigma_k:
+//
+//     p_k'^2 = p_k^2 + N (3 sigma_k)^2,
+//
+// and their information is at most a tenth of that of the control, so that sigmas of the datum are too small by 5 % at
+// most. What positions tell of one another is weakened by this; that is the price for an offset that is no unknown of
+// the adjustment.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/block/block.h"
+
+namespace megablock {
+
+struct PositionOffset {
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // positions minus control, metres; 0 where it does not count
+  Eigen::Vector3d sigma = Eigen::Vector3d::Zero();   // of the offset
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();  // median sigmas of the positions, as they were
+  Eigen::Vector3d after = Eigen::Vector3d::Zero();   // and as they are raised
+  std::int64_t points = 0;                           // control points that were compared
+};
+
+// The offset of the positions of `frames`, which hang together in `state` and have its datum from them. Empty where no
+// coordinate counts, fewer than three points can be compared, or positions are held. `frames` ascend. Deterministic.
+std::optional<PositionOffset> find_position_offset(const Block& block, const BlockState& state,
+                                                   const std::vector<FrameIndex>& frames);
+
+// Moves frames and positions by the offset, and raises the sigmas of the positions.
+void remove_offset(const PositionOffset& offset, const std::vector<FrameIndex>& frames,
+                   IndexedVector<FrameIndex, Frame>& positions, BlockState& state);
+
+// "the positions lie 46.90 m above the control points (sigma 0.02 m, 6 points): ...".
+std::string offset_text(const PositionOffset& offset);
+
+}  // namespace megablock

@@ -1,0 +1,111 @@
+// Positions of a simulated block that lie off its control by a known vector.
+#include "adjust/orientation/position_offset.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "io/simulate/blocks/simulate.h"
+
+namespace megablock {
+namespace {
+
+// The block has the datum of its positions, which are off by `offset`.
+struct OffsetBlock {
+  Block block;
+  BlockState truth, state;
+  std::vector<FrameIndex> frames;
+
+  explicit OffsetBlock(const Eigen::Vector3d& offset, double gps_sigma_m = 0.02, std::uint64_t seed = 1) {
+    SimulationOptions options;
+    options.frames = 40;
+    options.points_per_frame = 20;
+    options.control_points = 7;
+    options.control_sigma_m = 0.02;
+    options.gps_sigma_m = gps_sigma_m;
+    options.image_noise_px = 0.5;
+    options.seed = seed;
+    SimulatedBlock simulated = simulate_block(options);
+    block = std::move(simulated.block);
+    truth = state = simulated.truth;
+    for (FrameIndex f(0); block.frames.contains(f); ++f.value) {
+      state.frames[f].centre += offset;
+      block.frames[f].position_prior->position += offset;
+      frames.push_back(f);
+    }
+  }
+  std::optional<PositionOffset> find() const { return find_position_offset(block, state, frames); }
+};
+
+TEST(PositionOffset, OfHeightsIsFoundWithItsSigma) {
+  double squares = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const auto found = OffsetBlock({0, 0, 46.9}, 0.02, seed).find();
+    ASSERT_TRUE(found);
+    EXPECT_EQ(found->points, 7);
+    EXPECT_EQ(found->offset.head<2>(), Eigen::Vector2d::Zero());
+    EXPECT_NEAR(found->offset.z(), 46.9, 0.1);
+    squares += std::pow((found->offset.z() - 46.9) / found->sigma.z(), 2);
+  }
+  EXPECT_LT(squares / 20, 2);  // 20 squares of a number with sigma 1 have a mean of 1 +- 0.32
+  EXPECT_GT(squares / 20, 0.3);
+}
+
+TEST(PositionOffset, StandsThreeWrongPointsOfSeven) {
+  OffsetBlock block({3, -2, 46.9});
+  for (const std::size_t wrong : {0u, 3u, 5u}) block.block.control_points[wrong].position += Eigen::Vector3d(8, 0, -12);
+  const auto found = block.find();
+  ASSERT_TRUE(found);
+  EXPECT_LT((found->offset - Eigen::Vector3d(3, -2, 46.9)).norm(), 0.2);
+}
+
+TEST(PositionOffset, DoesNotCountWithinTheSigmas) {
+  EXPECT_FALSE(OffsetBlock({0, 0, 0}).find());
+  EXPECT_FALSE(OffsetBlock({0, 0, 8}, 3).find());
+  // What differs from point to point is no offset.
+  OffsetBlock bent({0, 0, 1});
+  for (std::size_t i = 0; i < 7; ++i) bent.block.control_points[i].position.z() += 0.5 * static_cast<double>(i);
+  EXPECT_FALSE(bent.find());
+}
+
+TEST(PositionOffset, NeedsThreePointsAndPositionsThatMayMove) {
+  OffsetBlock few({0, 0, 46.9});
+  few.block.control_points.resize(2);
+  EXPECT_FALSE(few.find());
+  OffsetBlock held({0, 0, 46.9});
+  for (Frame& frame : held.block.frames) frame.position_prior->sigma.setConstant(1e-8);
+  EXPECT_FALSE(held.find());
+}
+
+TEST(PositionOffset, IsRemovedFromPositionsAndBlock) {
+  OffsetBlock block({0, 0, 46.9});
+  const Eigen::Vector3d before = block.block.frames[FrameIndex(7)].position_prior->position;
+  const auto found = block.find();
+  ASSERT_TRUE(found);
+  remove_offset(*found, block.frames, block.block.frames, block.state);
+  EXPECT_LT((block.state.frames[FrameIndex(7)].centre - block.truth.frames[FrameIndex(7)].centre).norm(), 0.1);
+  const PositionPrior& after = *block.block.frames[FrameIndex(7)].position_prior;
+  EXPECT_NEAR(before.z() - after.position.z(), 46.9, 0.1);
+  EXPECT_EQ(before.head<2>(), after.position.head<2>());
+  // Forty positions tell the datum a third as well as the control does.
+  EXPECT_NEAR(after.sigma.z() / std::sqrt(40.0), 3 * found->sigma.z(), 0.1 * found->sigma.z());
+  EXPECT_NEAR(after.sigma.x(), 0.02, 1e-12);
+  EXPECT_FALSE(block.find());
+}
+
+TEST(PositionOffset, IsSaidInWords) {
+  PositionOffset found;
+  found.offset = {0, 0, 46.9};
+  found.sigma = {0, 0, 0.014};
+  found.before = {0, 0, 0.02};
+  found.after = {0, 0, 0.25};
+  found.points = 6;
+  EXPECT_THAT(offset_text(found),
+              testing::StartsWith("the positions lie 46.90 m above the control points (sigma 0.01 m, "
+                                  "6 points): ellipsoidal and orthometric heights?"));
+  found.offset = {-2, 1.5, -3};
+  EXPECT_THAT(offset_text(found),
+              testing::StartsWith("the positions lie 2.00 m west of, 1.50 m north of and 3.00 m below the control"));
+}
+
+}  // namespace
+}  // namespace megablock
