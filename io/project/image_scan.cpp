@@ -117,6 +117,7 @@ Camera make_camera(const std::string& name, const ImageHeader& header) {
   camera.intrinsics[kPrincipalX] = header.width / 2.0;
   camera.intrinsics[kPrincipalY] = header.height / 2.0;
   camera.prior_sigma = default_intrinsic_sigmas(camera);
+  camera.choose = true;
   return camera;
 }
 

@@ -59,11 +59,25 @@ std::uint64_t inputs_hash(const Stage& stage, const Job& job, const BlockState& 
   return hasher.value();
 }
 
+// The sample comes from the first images of the block, as far as these are enough: images that are added later must not
+// change the choice, which would adjust every tile anew.
+std::vector<FrameIndex> frames_of_sample(const Job& job, const Tiles& tiles, const BlockState& state, RigIndex rig,
+                                         const CameraSampleOptions& options) {
+  constexpr std::ptrdiff_t kEnough = 20;
+  std::vector<FrameIndex> frames;
+  for (const std::int64_t images : job.generations) {
+    BlockState early = state;
+    for (ImageIndex i(images); job.block.images.contains(i); ++i.value) early.oriented[job.block.images[i].frame] = 0;
+    frames = frames_near_the_middle(job.block, early, rig, tiles.component, options.max_frames);
+    if (std::ssize(frames) >= kEnough) break;
+  }
+  return frames;
+}
+
 std::vector<CameraChoice> choose(const Job& job, const Tiles& tiles, const BlockState& state, RigIndex rig,
                                  const std::vector<CameraIndex>& cameras) {
   const CameraSampleOptions options;
-  const std::vector<FrameIndex> frames =
-      frames_near_the_middle(job.block, state, rig, tiles.component, options.max_frames);
+  const std::vector<FrameIndex> frames = frames_of_sample(job, tiles, state, rig, options);
   BlockState sample = state;
   std::fill(sample.oriented.begin(), sample.oriented.end(), std::uint8_t{0});
   for (const FrameIndex f : frames) sample.oriented[f] = 1;

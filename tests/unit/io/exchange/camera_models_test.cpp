@@ -127,8 +127,8 @@ TEST_F(CameraModelProject, TakesModelAndParameters) {
   for (std::size_t p = 0; p < expected.size(); ++p) EXPECT_DOUBLE_EQ(camera.prior_sigma[p], expected[p]);
 }
 
-TEST_F(CameraModelProject, ChoosesParametersWhenAsked) {
-  EXPECT_FALSE(read("    focal_px: 1400\n").choose);
+TEST_F(CameraModelProject, ChoosesParametersUnlessTold) {
+  EXPECT_TRUE(read("    focal_px: 1400\n").choose);
   EXPECT_TRUE(read("    calibrate: auto\n").choose);
   const Camera affinity = read("    calibrate: [auto, b1]\n");
   EXPECT_TRUE(affinity.choose);
