@@ -15,36 +15,63 @@ namespace megablock {
 namespace {
 
 constexpr std::size_t kFewestPoints = 3;
-constexpr double kOfSigma = 5, kOfScatter = 3;          // times these an offset counts
-constexpr double kNormal = 1.4826, kOfMedian = 1.2533;  // sigma over median of |r|; sigma of a median
-constexpr double kControlDecides = 3;                   // sigmas of the offset
-constexpr double kKnown = kUnknownHeightSigma / 2;      // metres
+constexpr double kOfOwnSigma = 3, kOfPosition = 5, kOfScatter = 3;  // times these an offset counts
+constexpr double kNormal = 1.4826, kOfMedian = 1.2533;              // sigma over median of |r|; sigma of a median
+constexpr double kControlDecides = 3;                               // sigmas of the offset
+constexpr double kKnown = kUnknownHeightSigma / 2;                  // metres
 
 bool has_position(const Block& block, const BlockState& state, FrameIndex frame) {
   return state.oriented[frame] && block.frames[frame].position_prior.has_value();
 }
 
-// One coordinate of the offset, its scatter and its sigma.
+// What the control points say of one coordinate.
+struct Comparison {
+  std::vector<double> differences, control_sigmas, views;  // metres; views: from the cameras to the point
+};
+
 struct Difference {
   double offset = 0, scatter = 0, sigma = 0;
 };
 
-Difference difference_of(const std::vector<double>& differences, std::vector<double> sigmas) {
+Difference difference_of(const Comparison& c, double focal_share) {
   Difference found;
-  found.offset = median(differences);
+  found.offset = median(c.differences);
   std::vector<double> rest;
-  for (const double d : differences) rest.push_back(std::abs(d - found.offset));
+  for (const double d : c.differences) rest.push_back(std::abs(d - found.offset));
   found.scatter = kNormal * median(std::move(rest));
-  found.sigma = kOfMedian * std::max(found.scatter, median(std::move(sigmas))) /
-                std::sqrt(static_cast<double>(differences.size()));
+  const double of_points = kOfMedian * std::max(found.scatter, median(c.control_sigmas)) /
+                           std::sqrt(static_cast<double>(c.differences.size()));
+  found.sigma = std::hypot(of_points, median(c.views) * focal_share);
   return found;
+}
+
+bool counts(const Difference& d, double position_sigma) {
+  return std::abs(d.offset) > std::max({kOfOwnSigma * d.sigma, kOfPosition * position_sigma, kOfScatter * d.scatter});
+}
+
+// The prior sigma of the focal length over itself, the largest of the cameras that see control.
+double focal_share_of(const Block& block) {
+  double share = 0;
+  for (const ControlPoint& point : block.control_points)
+    for (const ImageMeasurement& mark : point.measurements) {
+      const Camera& camera = block.cameras[block.camera_of(mark.image)];
+      share = std::max(share, camera.prior_sigma[kFocal] / camera.intrinsics[kFocal]);
+    }
+  return share;
+}
+
+Eigen::Vector3d mean_centre(const std::vector<PointView>& marks) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const PointView& mark : marks) sum += mark.camera.centre;
+  return sum / static_cast<double>(marks.size());
 }
 
 }  // namespace
 
 std::optional<PositionOffset> find_position_offset(const Block& block, const BlockState& state,
                                                    const std::vector<FrameIndex>& frames) {
-  std::array<std::vector<double>, 3> position_sigmas, differences, control_sigmas;
+  std::array<std::vector<double>, 3> position_sigmas;
+  std::array<Comparison, 3> compared;
   for (const FrameIndex frame : frames) {
     if (!has_position(block, state, frame)) continue;
     const PositionPrior& prior = *block.frames[frame].position_prior;
@@ -56,26 +83,29 @@ std::optional<PositionOffset> find_position_offset(const Block& block, const Blo
     if (point.role != PointRole::kControl) continue;
     const SeenMarks seen = see_marks(block, state, frames, point);
     if (!seen.place) continue;
+    const Eigen::Vector3d view = *seen.place - mean_centre(seen.marks);
     for (int k = 0; k < 3; ++k) {
       if (!std::isfinite(point.position[k]) || !(point.sigma[k] < kKnown)) continue;
-      differences[static_cast<std::size_t>(k)].push_back((*seen.place)[k] - point.position[k]);
-      control_sigmas[static_cast<std::size_t>(k)].push_back(point.sigma[k]);
+      Comparison& c = compared[static_cast<std::size_t>(k)];
+      c.differences.push_back((*seen.place)[k] - point.position[k]);
+      c.control_sigmas.push_back(point.sigma[k]);
+      c.views.push_back(view[k]);
     }
   }
+  const double focal_share = focal_share_of(block);
   PositionOffset found;
   for (int k = 0; k < 3; ++k) {
     const auto axis = static_cast<std::size_t>(k);
     const auto count = static_cast<double>(position_sigmas[axis].size());
-    if (differences[axis].size() < kFewestPoints || position_sigmas[axis].empty()) continue;
-    const Difference d = difference_of(differences[axis], control_sigmas[axis]);
+    if (compared[axis].differences.size() < kFewestPoints || position_sigmas[axis].empty()) continue;
+    const Difference d = difference_of(compared[axis], focal_share);
     const double sigma = median(position_sigmas[axis]);
-    if (std::abs(d.offset) < kOfSigma * std::hypot(d.sigma, sigma) || std::abs(d.offset) < kOfScatter * d.scatter)
-      continue;
+    if (!counts(d, sigma)) continue;
     found.offset[k] = d.offset;
     found.sigma[k] = d.sigma;
     found.before[k] = sigma;
     found.after[k] = std::hypot(sigma, kControlDecides * d.sigma * std::sqrt(count));
-    found.points = std::max(found.points, std::ssize(differences[axis]));
+    found.points = std::max(found.points, std::ssize(compared[axis].differences));
   }
   if (found.offset.isZero(0)) return std::nullopt;
   return found;

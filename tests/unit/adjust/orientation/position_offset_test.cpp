@@ -26,6 +26,7 @@ struct OffsetBlock {
     options.seed = seed;
     SimulatedBlock simulated = simulate_block(options);
     block = std::move(simulated.block);
+    for (Camera& camera : block.cameras) camera.prior_sigma[kFocal] = 0;  // known
     truth = state = simulated.truth;
     for (FrameIndex f(0); block.frames.contains(f); ++f.value) {
       state.frames[f].centre += offset;
@@ -48,6 +49,23 @@ TEST(PositionOffset, OfHeightsIsFoundWithItsSigma) {
   }
   EXPECT_LT(squares / 20, 2);  // 20 squares of a number with sigma 1 have a mean of 1 +- 0.32
   EXPECT_GT(squares / 20, 0.3);
+}
+
+// A focal length that is too long puts the ground too low, as an offset of the heights would.
+TEST(PositionOffset, IsNoBetterKnownThanTheFocalLength) {
+  OffsetBlock block({0, 0, 46.9});
+  for (CameraIndex c(0); block.block.cameras.contains(c); ++c.value) {
+    block.block.cameras[c].prior_sigma[kFocal] = 0.02 * block.block.cameras[c].intrinsics[kFocal];
+    block.state.cameras[c][kFocal] *= 1.02;
+  }
+  const auto found = block.find();
+  ASSERT_TRUE(found);
+  EXPECT_GT(std::abs(found->offset.z() - 46.9), 0.5);
+  EXPECT_NEAR(std::abs(found->offset.z() - 46.9) / found->sigma.z(), 1, 0.2);
+  // 8 m are no more than three sigmas of a height over ground of some 100 m and a focal length good to 5 %.
+  OffsetBlock near({0, 0, 8});
+  for (Camera& camera : near.block.cameras) camera.prior_sigma[kFocal] = 0.05 * camera.intrinsics[kFocal];
+  EXPECT_FALSE(near.find());
 }
 
 TEST(PositionOffset, StandsThreeWrongPointsOfSeven) {
