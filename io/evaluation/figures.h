@@ -39,7 +39,7 @@ using megablock::ResidualField;
 struct PositionResidual {
   FrameIndex frame;
   Eigen::Vector3d difference;  // adjusted minus observed position of the antenna; east, north, up; metres
-  Eigen::Vector3d sigma;       // stated, of the observation
+  Eigen::Vector3d sigma;       // of the observation, as the adjustment used it (used_sigmas.h)
 };
 
 struct AttitudeResidual {

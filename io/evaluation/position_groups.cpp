@@ -60,13 +60,14 @@ struct Groups {
 };
 
 // The groups along an axis; apart = 0: there is one group.
-Groups groups_along(std::size_t axis, std::span<const report::PositionResidual> residuals) {
+Groups groups_along(std::size_t axis, const BlockResult& result, std::span<const report::PositionResidual> residuals) {
   Groups groups;
   groups.axis = axis;
   std::vector<Height> heights;
   std::vector<double> sigmas;
   for (const report::PositionResidual& r : residuals) {
-    const double sigma = r.sigma[static_cast<int>(axis)];
+    // The stated sigma: two groups may be why the adjustment used a larger one.
+    const double sigma = result.block.frames[r.frame].position_prior->sigma[static_cast<int>(axis)];
     if (sigma >= kUnknownHeightSigma || sigma <= 2 * kHeldPositionSigma) continue;
     heights.push_back({-r.difference[static_cast<int>(axis)], r.frame});  // observed minus adjusted
     sigmas.push_back(sigma);
@@ -95,7 +96,7 @@ std::string position_groups_text(const BlockResult& result, std::span<const repo
   constexpr std::array<const char*, 3> kAxes{"east of", "north of", "above"};
   Groups widest;
   for (std::size_t axis = 0; axis < 3; ++axis)
-    if (Groups groups = groups_along(axis, residuals); groups.apart > widest.apart) widest = std::move(groups);
+    if (Groups groups = groups_along(axis, result, residuals); groups.apart > widest.apart) widest = std::move(groups);
   if (widest.apart == 0) return "";
   std::string text = fmt::format("{} of {} positions lie {:.1f} m {} the other {}: ", widest.upper.size(), widest.all,
                                  widest.apart, kAxes[widest.axis], widest.all - widest.upper.size());

@@ -5,7 +5,7 @@
 // method from gray-level histograms", IEEE Trans. SMC 9(1), 1979). Each side of a cut has its mean m and its standard
 // deviation s. The sides are two groups when both have at least four positions, when
 //
-//     m_2 - m_1 > 6 (1 + 6 / n) max(s_1, s_2)   and   m_2 - m_1 > 3 times the median sigma,
+//     m_2 - m_1 > 6 (1 + 6 / n) max(s_1, s_2)   and   m_2 - m_1 > 3 times the median stated sigma,
 //
 // of the n positions, and when at least half of this distance is empty. The deviations of few are small by chance. One
 // heap does not pass: cut in the middle, its sides lie 2.6 s apart where errors are normal, and 3.5 s where they are

@@ -21,9 +21,11 @@ struct Residuals {
     for (std::int64_t i = 0; i < count; ++i) {
       Frame frame;
       frame.name = "f" + std::to_string(i);
+      frame.position_prior = PositionPrior{};
+      frame.position_prior->sigma = {3, 3, 6};
       result.block.frames.push_back(frame);
-      rows.push_back(
-          {FrameIndex(i), Eigen::Vector3d(error(random), error(random), error(random)), Eigen::Vector3d(3, 3, 6)});
+      rows.push_back({FrameIndex(i), Eigen::Vector3d(error(random), error(random), error(random)),
+                      Eigen::Vector3d(11, 11, 22)});  // those of the adjustment
     }
   }
   std::string text() const { return position_groups_text(result, rows); }
