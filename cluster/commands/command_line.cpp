@@ -304,6 +304,11 @@ void add_evaluate(CLI::App& app, Action& action) {
   command->footer("Example: megablock evaluate job truth.csv --json");
   command->add_option("job", options->job, "Job directory")->required();
   command->add_option("truth", options->truth, "Poses: truth.csv of 'simulate', or any pose CSV")->required();
+  EvaluateOptions& of_truth = options->evaluation;
+  command->add_option("--truth-sigma", of_truth.truth_position_sigma_m, "Sigma of the true positions, m per axis")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--truth-sigma-rotation", of_truth.truth_rotation_sigma_deg, "Of the true attitudes, degrees")
+      ->check(CLI::NonNegativeNumber);
   command->add_flag("--scale-sigma", options->evaluation.scale_sigma,
                     "Multiply the posterior sigmas by the a-posteriori sigma");
   command->add_flag("--json", options->json, "Figures as JSON");

@@ -10,10 +10,10 @@
 #include <numbers>
 #include <unordered_map>
 
-#include "geometry/similarity/similarity.h"
 #include "io/base/error.h"
 #include "io/block/crs.h"
 #include "io/block/held_priors.h"
+#include "io/evaluation/free_datum.h"
 #include "io/evaluation/used_sigmas.h"
 #include "io/result/result_option.h"
 #include "io/store/units/state_file.h"
@@ -99,18 +99,36 @@ bool is_free(const BlockResult& result) {
   return true;
 }
 
-Similarity align(const BlockResult& result, const std::vector<Match>& matches) {
-  std::vector<Eigen::Vector3d> from, to;
+// The similarity that stands for a free datum, and the covariances of the matched frames after it.
+struct Aligned {
+  Similarity similarity;
+  DatumCovariances covariances;
+};
+
+std::vector<FrameIndex> frames_of(const std::vector<Match>& matches) {
+  std::vector<FrameIndex> frames;
+  for (const Match& m : matches) frames.push_back(m.frame);
+  return frames;
+}
+
+Aligned as_it_is(const BlockResult& result, const std::vector<Match>& matches) {
+  return {Similarity(), stated_covariances(result, frames_of(matches))};
+}
+
+Aligned align(const BlockResult& result, const std::vector<Match>& matches) {
+  std::vector<Pose> from, to;
+  const std::vector<FrameIndex> frames = frames_of(matches);
   for (const Match& m : matches) {
-    from.push_back(result.state.frames[m.frame].centre);
-    to.push_back(m.truth.centre);
+    from.push_back(result.state.frames[m.frame]);
+    to.push_back(m.truth);
   }
-  const auto similarity = matches.size() >= 3 ? fit_similarity(from, to) : std::nullopt;
+  const DatumFit fit = matches.size() < 3 || determine_similarity(from) ? DatumFit::kPositions : DatumFit::kPoses;
+  const auto similarity = fit_datum(from, to, fit);
   if (!similarity)
     throw InputError(
         "the datum of the result is free, and fewer than three of its frames at different places have a true pose; "
         "give a truth with at least three");
-  return *similarity;
+  return {*similarity, covariances_after_fit(result, frames, fit)};
 }
 
 // The truth in the ground frame of the result, if both frames are known; otherwise the truth as it is.
@@ -133,8 +151,12 @@ PoseTable in_ground_of(const GroundFrame& ground, const PoseTable& truth) {
   return moved;
 }
 
-void evaluate_frames(const BlockResult& result, const std::vector<Match>& matches, const Similarity& similarity,
-                     double variance_factor, Evaluation& evaluation) {
+void evaluate_frames(const BlockResult& result, const std::vector<Match>& matches, const Aligned& aligned,
+                     double variance_factor, const EvaluateOptions& options, Evaluation& evaluation) {
+  const Similarity& similarity = aligned.similarity;
+  const double truth_angle = options.truth_rotation_sigma_deg * std::numbers::pi / 180;
+  const Eigen::Matrix3d truth_position = std::pow(options.truth_position_sigma_m, 2) * Eigen::Matrix3d::Identity(),
+                        truth_rotation = truth_angle * truth_angle * Eigen::Matrix3d::Identity();
   RootMeanSquare position, rotation, relative;
   NormalisedError normalised_position, normalised_rotation;
   std::array<NormalisedError, 2> position_by_place, rotation_by_place;  // interior, boundary
@@ -161,11 +183,16 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
         frames[matches[i - 1].frame].pass == frames[m.frame].pass)
       relative.add((error - previous_error).squaredNorm());
     previous_error = error;
-    if (result.frame_covariance.empty()) continue;
+    if (aligned.covariances.frames.empty()) continue;
     // Order of the increment: rotation, centre.
-    const BlockResult::Matrix6 covariance = variance_factor * result.frame_covariance[m.frame];
-    const Eigen::Matrix3d rotation_covariance = turn * covariance.topLeftCorner<3, 3>() * turn.transpose(),
-                          position_covariance = stretch * covariance.bottomRightCorner<3, 3>() * stretch.transpose();
+    const auto of_rotation = [&](const BlockResult::Matrix6& c) -> Eigen::Matrix3d {
+      return turn * c.topLeftCorner<3, 3>() * turn.transpose() + truth_rotation;
+    };
+    const auto of_position = [&](const BlockResult::Matrix6& c) -> Eigen::Matrix3d {
+      return stretch * c.bottomRightCorner<3, 3>() * stretch.transpose() + truth_position;
+    };
+    const BlockResult::Matrix6 covariance = variance_factor * aligned.covariances.frames[i];
+    const Eigen::Matrix3d rotation_covariance = of_rotation(covariance), position_covariance = of_position(covariance);
     const Frame& frame = frames[m.frame];
     const bool by_place = !result.boundary.empty();
     const std::size_t place = by_place && result.boundary[m.frame] != 0;
@@ -179,7 +206,8 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
     }
   }
   evaluation.frames = position.count();
-  evaluation.with_sigmas = !result.frame_covariance.empty();
+  evaluation.with_sigmas = !aligned.covariances.frames.empty();
+  evaluation.sigma_note = aligned.covariances.note;
   evaluation.position_rms_m = position.value();
   evaluation.position_max_m = largest;
   evaluation.rotation_rms_deg = rotation.value() * 180 / std::numbers::pi;
@@ -227,10 +255,10 @@ Evaluation evaluate(const BlockResult& result, const PoseTable& truth, const Eva
   evaluation.frames_missing = static_cast<std::int64_t>(truth.names.size() - matches.size());
   evaluation.aligned = options.align == EvaluateOptions::Align::kAlways ||
                        (options.align == EvaluateOptions::Align::kAuto && is_free(result));
-  const Similarity similarity = evaluation.aligned ? align(result, matches) : Similarity();
+  const Aligned aligned = evaluation.aligned ? align(result, matches) : as_it_is(result, matches);
   // Never twice.
   const double variance_factor = options.scale_sigma && !result.sigma_scaled ? result.variance_factor : 1;
-  evaluate_frames(result, matches, similarity, variance_factor, evaluation);
+  evaluate_frames(result, matches, aligned, variance_factor, options, evaluation);
   // The given positions of check points are in the ground frame of the block. A free block is in another frame, so they
   // cannot be compared.
   if (!evaluation.aligned) evaluate_control(result, variance_factor, evaluation);
@@ -281,6 +309,7 @@ std::string to_text(const Evaluation& e) {
   add(std::isfinite(e.normalised_error_check), "check points", e.normalised_error_check);
   if (!ratios.empty())
     text += "\nerror / stated sigma        " + ratios + " (1: the sigmas are true" + (some_held ? "; -: held)" : ")");
+  if (!e.sigma_note.empty()) text += "\n" + e.sigma_note;
   return text;
 }
 
@@ -299,6 +328,7 @@ std::string to_json(const Evaluation& e) {
   json["normalised_error_rotation_interior"] = e.normalised_error_rotation_interior;
   json["normalised_error_position_boundary"] = e.normalised_error_position_boundary;
   json["normalised_error_rotation_boundary"] = e.normalised_error_rotation_boundary;
+  json["sigma_note"] = e.sigma_note;
   json["check_points"] = e.check_points;
   json["check_rms_m"] = e.check_rms_m;
   json["check_rms_horizontal_m"] = e.check_rms_horizontal_m;

@@ -7,8 +7,9 @@
 //
 // Alignment: if nothing but the images determines the datum, the result is known up to a similarity X -> s R X + t. The
 // similarity that fits the projection centres of the result to those of the truth by least squares takes its place.
-// Positions and their covariances are then transformed with s R, and rotations with R. The seven fitted parameters
-// lower the errors a little, noticeably in blocks of a few frames.
+// Positions and their covariances are then transformed with s R, and rotations with R. The fit takes seven parameters
+// of the errors. The covariances are those after such a fit as well (free_datum.h), so that the ratios are right in
+// blocks of a few frames, too.
 //
 // A truth in another ground frame (another origin) is first transformed exactly, through geodetic coordinates: its axes
 // differ from those of the result by the rotation of the local vertical between the two origins.
@@ -27,6 +28,8 @@ struct EvaluateOptions {
   enum class Align { kAuto, kNever, kAlways } align = Align::kAuto;
   // Multiplies posterior covariances by the a-posteriori variance factor, unless the job has done so.
   bool scale_sigma = false;
+  // Sigmas of the true poses themselves, per axis. Their squares are added to the covariances of the result.
+  double truth_position_sigma_m = 0, truth_rotation_sigma_deg = 0;
 };
 
 struct Evaluation {
@@ -40,6 +43,8 @@ struct Evaluation {
   double rotation_rms_deg = kNone;         // root mean square rotation angle
   double relative_position_rms_m = kNone;  // errors of the vectors between successive frames of a pass
   bool with_sigmas = false;                // the result has covariances of its frames
+  // Of an aligned block: why there are no ratios, or what is wrong with their datum. Empty: nothing.
+  std::string sigma_note = {};
   // Normalised errors of all frames, of those touched by one tile (interior), and of those touched by several
   // (boundary). Held positions and attitudes do not count, because they have no sigma to compare with. kNone without
   // such frames or without covariances.

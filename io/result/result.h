@@ -96,7 +96,18 @@ struct BlockResult : TrackResults {
 
   // Posterior covariances with the a-priori variance factor 1, unless sigma_scaled. Empty if they were not computed.
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
-  IndexedVector<FrameIndex, Matrix6> frame_covariance;  // rotation increment (radians), centre (metres)
+  // Of the rotation increment (radians) and the centre (metres). Where the datum is free, they belong to inner
+  // constraints over the poses of the part (docs/reference/methods.md, "Sigmas").
+  IndexedVector<FrameIndex, Matrix6> frame_covariance;
+  // The same after the best-fit similarity of all positions, as a comparison with given positions needs them. Empty
+  // where the datum is not free; NaN or zero where such a fit does not exist.
+  IndexedVector<FrameIndex, Matrix6> aligned_covariance;
+  // The covariance of all poses together, in the same datum. Only for blocks of few frames, else empty.
+  struct JointCovariance {
+    std::vector<FrameIndex> frames;  // ascending
+    Eigen::MatrixXd matrix;          // [6 frames x 6 frames]
+  };
+  JointCovariance joint_covariance;
   // Of the parameters of the camera model; zero for held ones.
   IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;
   // [rigs][mounts] of PoseIncrement: rotation increment about the rig's axes (radians), centre (metres); zero for held

@@ -8,9 +8,9 @@
 #include "io/base/error.h"
 #include "io/result/result.h"
 #include "io/result/result_digest.h"
+#include "io/result/result_precision.h"
 #include "io/result/result_tracks.h"
 #include "io/result/track_batches.h"
-#include "io/store/hdf5/hdf5_cameras.h"
 #include "io/store/hdf5/hdf5_matrices.h"
 #include "io/store/hdf5/hdf5_tables.h"
 #include "io/store/units/hdf5_block.h"
@@ -39,49 +39,6 @@ void check_sizes(const BlockResult& result) {
 }
 
 std::int64_t rows(const auto& items) { return static_cast<std::int64_t>(items.size()); }
-
-using MountCovariances = IndexedVector<RigIndex, std::vector<BlockResult::Matrix6>>;
-
-// Writes one row per mount, in the order of the group 'mounts'.
-void put_mount_covariances(Hdf5Writer& file, const MountCovariances& rigs) {
-  std::vector<BlockResult::Matrix6> mounts;
-  for (const auto& rig : rigs) mounts.insert(mounts.end(), rig.begin(), rig.end());
-  file.array("mounts/covariance", flattened<double>(mounts), {rows(mounts), 6, 6},
-             {"rad, m", "posterior, of (rotation increment about the rig's axes, centre); held: 0"});
-}
-
-MountCovariances get_mount_covariances(const Hdf5Reader& file, const IndexedVector<RigIndex, Rig>& rigs) {
-  std::int64_t count = 0;
-  for (const Rig& rig : rigs) count += rows(rig.mounts);
-  const auto mounts = square_matrices<BlockResult::Matrix6>(file.array<double>("mounts/covariance", {count, 6, 6}));
-  MountCovariances covariances;
-  auto next = mounts.begin();
-  for (const Rig& rig : rigs) {
-    const auto first = std::exchange(next, next + rows(rig.mounts));
-    covariances.push_back(std::vector<BlockResult::Matrix6>(first, next));
-  }
-  return covariances;
-}
-
-void put_precision(Hdf5Writer& file, const BlockResult& result) {
-  static_assert(sizeof(BlockResult::Matrix6) == 36 * sizeof(double));  // the matrices can be written without a copy
-  if (!result.frame_covariance.empty())
-    file.dataset("frames/covariance", ElementType::kDouble, result.frame_covariance.data(),
-                 {rows(result.frame_covariance), 6, 6},
-                 {"rad, m", "posterior, of (rotation increment about the ground axes, centre)"});
-  if (!result.camera_covariance.empty()) put_covariances(file, result.camera_covariance);
-  if (!result.mount_covariance.empty()) put_mount_covariances(file, result.mount_covariance);
-}
-
-void get_precision(const Hdf5Reader& file, BlockResult& result) {
-  if (file.has("frames/covariance"))
-    result.frame_covariance = IndexedVector<FrameIndex, BlockResult::Matrix6>(square_matrices<BlockResult::Matrix6>(
-        file.array<double>("frames/covariance", {rows(result.block.frames), 6, 6})));
-  if (file.has("cameras/covariance"))
-    result.camera_covariance = IndexedVector<CameraIndex, Eigen::MatrixXd>(
-        get_covariances(file, column(result.block.cameras, [](const Camera& c) { return c.intrinsics.model(); })));
-  if (file.has("mounts/covariance")) result.mount_covariance = get_mount_covariances(file, result.block.rigs);
-}
 
 void put_control_results(Hdf5Writer& file, const std::vector<BlockResult::ControlResult>& control) {
   if (control.empty()) return;

@@ -267,9 +267,17 @@ BlockComponent::FreeMoves BlockComponent::move_frame(const Eigen::Vector3d& posi
 BlockComponent::FreeMoves BlockComponent::move_point(const Eigen::Vector3d& position) const {
   return similarity_of_point(position, centre, extent) * directions.leftCols(std::ssize(columns));
 }
+Matrix67 BlockComponent::similarity(const Eigen::Vector3d& position, const Eigen::Vector3d& reference) const {
+  return similarity_of_frame(position, reference, centre, extent);
+}
 Vector6 BlockComponent::weights() const {
   Vector6 w = Vector6::Ones();
   w.tail<3>() /= extent * extent;
+  return w;
+}
+Vector6 BlockComponent::position_weights() const {
+  Vector6 w = weights();
+  w.head<3>().setZero();
   return w;
 }
 
@@ -286,6 +294,13 @@ HeldAgainstPriors BlockGauge::against_priors() const {
     all.scale |= c.against_priors.scale;
   }
   return all;
+}
+
+std::vector<std::size_t> BlockGauge::free_components() const {
+  std::vector<std::size_t> rows;
+  for (std::size_t c = 0; c < components.size(); ++c)
+    if (!components[c].columns.empty()) rows.push_back(c);
+  return rows;
 }
 
 BlockGauge make_gauge(const std::vector<TileGauge>& tiles, const HeldAgainstPriors& held_before) {
@@ -340,21 +355,21 @@ std::vector<const BlockComponent*> free_component_of_frame(const BlockGauge& gau
 }
 
 TileDatum tile_datum(const BlockGauge& gauge, std::int64_t tile, const TileProblem& problem, const TilePlan& plan,
-                     const TileState& state, bool with_columns) {
+                     const TileState& state, DatumColumns wanted) {
   TileDatum datum;
   if (!gauge.free()) return datum;
   for (const GaugeConstraint& c : gauge.constraints) {
     const UnknownId id{UnknownKind::kFrame, 0, c.frame};
     if (find_unknown(plan.owned, id) >= 0) datum.holds.push_back({id, c.directions.leftCols(c.count), c.weight});
   }
-  if (!with_columns) return datum;
+  if (wanted != DatumColumns::kSimilarities) return datum;
   const auto components = free_component_of_frame(gauge, tile, plan);
+  const std::vector<std::size_t> free = gauge.free_components();
   Step& columns = datum.columns;
-  columns.columns = gauge.defect();
+  columns.columns = gauge.defect() + 7 * std::ssize(free);
   for (const Unknown& u : plan.owned)
     if (u.id.kind == UnknownKind::kFrame) columns.unknowns.push_back(u);
-  // The further right-hand sides are the rows W N of the owned frames. The other unknowns have zero, because W weighs
-  // frames alone.
+  // The rows W N and W_p N of the owned frames. The other unknowns have zero, because W weighs frames alone.
   const std::int64_t n = total_dimension(columns.unknowns);
   columns.values.assign(at(n * columns.columns), 0);
   for (std::size_t i = 0; i < columns.unknowns.size(); ++i) {
@@ -363,13 +378,32 @@ TileDatum tile_datum(const BlockGauge& gauge, std::int64_t tile, const TileProbl
         problem.frames.begin());
     const BlockComponent* c = components[row];
     if (c == nullptr) continue;
-    const Eigen::MatrixXd weighted =
-        c->weights().asDiagonal() * c->move_frame(state.frames[row].centre, reference_place(problem, state, row));
-    for (Eigen::Index k = 0; k < weighted.cols(); ++k)
-      for (std::int64_t r = 0; r < 6; ++r)
-        columns.values[at(6 * static_cast<std::int64_t>(i) + r + c->columns[at(k)] * n)] = weighted(r, k);
+    const Eigen::Vector3d position = state.frames[row].centre, reference = reference_place(problem, state, row);
+    const auto put = [&](const Vector6& weights, const Eigen::MatrixXd& moves, Eigen::Index k, std::int64_t column) {
+      Eigen::Map<Vector6>(columns.values.data() + 6 * static_cast<std::int64_t>(i) + column * n) =
+          weights.cwiseProduct(moves.col(k));
+    };
+    const Eigen::MatrixXd moves = c->move_frame(position, reference);
+    for (Eigen::Index k = 0; k < moves.cols(); ++k) put(c->weights(), moves, k, c->columns[at(k)]);
+    const std::int64_t first =
+        gauge.defect() + 7 * (std::ranges::find(free, at(c - gauge.components.data())) - free.begin());
+    const Eigen::MatrixXd similarity = c->similarity(position, reference);
+    for (Eigen::Index k = 0; k < 7; ++k) put(c->position_weights(), similarity, k, first + k);
   }
   return datum;
+}
+
+Step unit_columns(const UnknownList& frames, const TilePlan& plan) {
+  Step columns{{}, total_dimension(frames), {}};
+  for (const Unknown& u : plan.owned)
+    if (u.id.kind == UnknownKind::kFrame) columns.unknowns.push_back(u);
+  const std::int64_t n = total_dimension(columns.unknowns);
+  columns.values.assign(at(n * columns.columns), 0);
+  for (std::size_t i = 0; i < columns.unknowns.size(); ++i) {
+    const std::int64_t first = 6 * find_unknown(frames, columns.unknowns[i].id);
+    for (std::int64_t r = 0; r < 6; ++r) columns.values[at(6 * static_cast<std::int64_t>(i) + r + (first + r) * n)] = 1;
+  }
+  return columns;
 }
 
 GaugeReport judge_gauge(const SubtreeSums& root, const BlockGauge& gauge, const UnknownName& name) {

@@ -73,8 +73,8 @@ struct BlockComponent {
   double extent = 1;
   std::int64_t frames = 0;  // a frame on the separator counts once for each tile
   std::int64_t lowest_frame = -1;
-  // The numbers of the further right-hand sides of its free directions: none when its datum is complete, at most 7, a
-  // common scale last.
+  // The numbers of its free directions among those of the block: none when its datum is complete, at most 7, a common
+  // scale last.
   std::vector<std::int64_t> columns;
   Matrix77 directions = Matrix77::Zero();  // first of its columns: the free combinations of (phi, t, s)
   std::int64_t defect = 0;  // its share of the block's defect: a common scale counts in one component only
@@ -90,7 +90,10 @@ struct BlockComponent {
   FreeMoves move_point(const Eigen::Vector3d& position) const;
   FreeMoves free_part(const Matrix67& similarity) const;
   // Squares of rotations (rad) and of positions (in extents) weigh alike.
-  Eigen::Matrix<double, 6, 1> weights() const;  // diagonal of W
+  Eigen::Matrix<double, 6, 1> weights() const;           // diagonal of W
+  Eigen::Matrix<double, 6, 1> position_weights() const;  // the same for positions, 0 for rotations
+  // N with all seven columns, whichever of them are free.
+  Matrix67 similarity(const Eigen::Vector3d& position, const Eigen::Vector3d& reference) const;
 };
 
 // Holds one frame along `count` directions. The columns of `directions` are independent combinations of the columns of
@@ -106,9 +109,11 @@ struct BlockGauge {
   std::vector<BlockComponent> components;
   std::vector<GaugeConstraint> constraints;
   std::vector<std::vector<std::int64_t>> part_component;  // [tiles][parts] row of components
-  std::int64_t defect() const;  // sum over the components = number of further right-hand sides
+  std::int64_t defect() const;                            // sum over the components
   bool free() const { return defect() > 0; }
   HeldAgainstPriors against_priors() const;  // of all components
+  // The rows of the components whose datum is not complete.
+  std::vector<std::size_t> free_components() const;
 };
 // Finds the datum of the block from all tiles, in tile order. The result has the same bits on every rank, as it depends
 // on the gathered parts alone. `held_before`: by earlier data of the block.
@@ -118,10 +123,20 @@ BlockGauge make_gauge(const std::vector<TileGauge>& tiles, const HeldAgainstPrio
 std::vector<const BlockComponent*> free_component_of_frame(const BlockGauge& gauge, std::int64_t tile,
                                                            const TilePlan& plan);
 
-// The part of the datum that one tile adds: its constraints and, if asked for, the rows W N of the frames that it owns.
-// Every frame is owned by one tile of the block, so that each constraint is added once.
+// The further right-hand sides of a sweep over a block with a free datum.
+enum class DatumColumns : std::int32_t {
+  kNone = 0,
+  kSimilarities = 1,  // those of the S-transformations (inner_constraints.h)
+  kFrames = 2         // unit vectors: the columns of the covariance that belong to the frames
+};
+
+// The part of the datum that one tile adds: its constraints and, with kSimilarities, the rows W N of the frames that it
+// owns. Every frame is owned by one tile of the block, so that each constraint is added once.
 TileDatum tile_datum(const BlockGauge& gauge, std::int64_t tile, const TileProblem& problem, const TilePlan& plan,
-                     const TileState& state, bool with_columns);
+                     const TileState& state, DatumColumns columns);
+// The further right-hand sides of kFrames: the unit vectors of the frames that the tile owns. `frames`: those of the
+// whole block, ascending; frame k has the columns 6 k to 6 k + 5.
+Step unit_columns(const UnknownList& frames, const TilePlan& plan);
 
 // The datum in words and numbers, for the report.
 struct GaugeReport {

@@ -40,7 +40,7 @@ UpdateMatrix condense_on_mounts(const TileProblem& problem, const TileState& sta
   }
   const TilePlan plan = make_tile_plan(problem, node);
   const BlockGauge gauge = make_gauge({tile_gauge(problem, plan, state)});
-  return condense_tile(problem, plan, state, 0, tile_datum(gauge, 0, problem, plan, state, false)).update;
+  return condense_tile(problem, plan, state, 0, tile_datum(gauge, 0, problem, plan, state, DatumColumns::kNone)).update;
 }
 
 // The update matrix unpacked, both triangles.

@@ -116,6 +116,9 @@ TileStep solve_tile_down(const TileProblem& problem, const TilePlan& plan, const
 struct TileCovariance {
   CovarianceMatrix boundary;                        // as given
   std::vector<Eigen::Matrix<double, 6, 6>> frames;  // [frames]; zero where untouched
+  // [frames] where the datum is free: after the best-fit similarity of all positions of the part
+  // (inner_constraints.h). NaN where this does not exist.
+  std::vector<Eigen::Matrix<double, 6, 6>> aligned_frames;
   std::vector<Eigen::MatrixXd> cameras;  // [cameras] covariance of the model's parameters; zero for held ones
   std::vector<Eigen::Matrix<double, 6, 6>> mounts;  // [mounts]
   std::vector<Eigen::Matrix3d> points;              // [points]; zero for points that take no part

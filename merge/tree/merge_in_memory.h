@@ -27,6 +27,8 @@ class MergeInMemory : public TreeRunner {
   // The results of final_up(): the covariances by tile, under inner constraints where the datum is free; the seams of
   // all inner nodes, in the order of the nodes; the check of every tile against the rest of the block; the datum.
   const std::vector<TileCovariance>& covariances() const { return covariances_; }
+  // Of all frames of a small block together (MergeTreeRunner::Posterior).
+  const CovarianceMatrix& frame_covariance() const { return posterior_.frames; }
   const std::vector<SeamReport>& seams() const { return posterior_.seams; }
   const std::vector<TileCheck>& tile_checks() const { return posterior_.tile_checks; }
   const GaugeReport& gauge() const { return gauge_; }

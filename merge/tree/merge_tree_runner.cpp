@@ -89,7 +89,9 @@ BlockGauge MergeTreeRunner::gather_gauge() const {
 
 TileDatum MergeTreeRunner::datum_of(std::size_t row) const {
   const RankTile& tile = tiles_.outline(row);
-  return tile_datum(gauge_, tile.tile, tile.problem, tile_plans_[row], tile.state, with_columns_);
+  TileDatum datum = tile_datum(gauge_, tile.tile, tile.problem, tile_plans_[row], tile.state, columns_);
+  if (columns_ == DatumColumns::kFrames) datum.columns = unit_columns(block_frames_, tile_plans_[row]);
+  return datum;
 }
 
 InnerSums MergeTreeRunner::gather_inner_sums(const std::vector<TileStep>& steps) const {
@@ -103,6 +105,38 @@ InnerSums MergeTreeRunner::gather_inner_sums(const std::vector<TileStep>& steps)
   InnerSums sums = all.front();
   for (std::size_t t = 1; t < all.size(); ++t) sums.add(all[t]);
   return sums;
+}
+
+CovarianceMatrix MergeTreeRunner::frame_covariance_of_small_block() {
+  std::int64_t frames = 0;
+  for (const BlockComponent& c : gauge_.components) frames += c.frames;
+  // The sum counts a frame once for each of its tiles.
+  if (frames > 2 * kMostFramesWithCovariances) return {};
+  std::vector<UnknownList> own(tiles_.size());
+  for (std::size_t row = 0; row < tiles_.size(); ++row)
+    for (const Unknown& u : tile_plans_[row].owned)
+      if (u.id.kind == UnknownKind::kFrame) own[row].push_back(u);
+  const std::size_t tiles = plan_.node_of_leaf.size();
+  block_frames_.clear();
+  for (const UnknownList& of_tile : gather_by_tile(ranks_, tiles, tiles_, own))
+    block_frames_.insert(block_frames_.end(), of_tile.begin(), of_tile.end());
+  std::ranges::sort(block_frames_);
+  if (block_frames_.empty() || std::ssize(block_frames_) > kMostFramesWithCovariances) return {};
+
+  // It is small and is not recorded.
+  SweepRecorder* const recorder = std::exchange(recorder_, nullptr);
+  columns_ = DatumColumns::kFrames;
+  condense_all(0);
+  const std::vector<TileStep> steps = steps_down(0);
+  std::vector<FrameColumns> columns;
+  for (std::size_t row = 0; row < tiles_.size(); ++row) {
+    const RankTile& tile = tiles_.outline(row);
+    columns.push_back(
+        frame_columns(gauge_, tile.tile, tile.problem, tile_plans_[row], tile.state, steps[row].unknowns));
+  }
+  columns_ = DatumColumns::kNone;
+  recorder_ = recorder;
+  return frame_covariance(gauge_, block_frames_, gather_by_tile(ranks_, tiles, tiles_, columns));
 }
 
 bool MergeTreeRunner::mine(std::int64_t node) const {

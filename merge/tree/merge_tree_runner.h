@@ -53,6 +53,9 @@ struct SweepSeconds {
 // neighbours are on one rank. Returns the rank of each tile.
 std::vector<int> distribute_tiles(const MergeTree& tree, const std::vector<std::int64_t>& observations, int ranks);
 
+// The covariances between frames grow with the square of their number: these need 4.7 MB.
+inline constexpr std::int64_t kMostFramesWithCovariances = 128;
+
 class MergeTreeRunner : public TreeRunner {
  public:
   // Collective. `tiles` holds the tiles of this rank, ascending; `rank_of_tile` lists all tiles. `tiles` and `solver`
@@ -84,6 +87,9 @@ class MergeTreeRunner : public TreeRunner {
     std::vector<SeamReport> seams;       // of all inner nodes, in node order; on every rank
     std::vector<TileCheck> tile_checks;  // of all tiles, in tile order; on every rank
     ObservationTable observations;       // of the whole block, on every rank
+    // The covariance of all frames together, on every rank; of a free datum under inner constraints. Only for a block
+    // of at most kMostFramesWithCovariances frames, else empty.
+    CovarianceMatrix frames;
   };
   // Calls `visit` once for each tile of this rank with its covariances, which are not stored.
   using VisitCovariance = std::function<void(const RankTile&, const TileCovariance&)>;
@@ -151,6 +157,13 @@ class MergeTreeRunner : public TreeRunner {
   double seam_probability() const;  // of a false alarm at one seam
   BlockGauge gather_gauge() const;
   InnerSums gather_inner_sums(const std::vector<TileStep>& steps) const;
+  // The covariances from the factors of the last sweep up, tile by tile; the separator is that of the tile under the
+  // minimal constraints.
+  using VisitTileCovariance =
+      std::function<void(std::size_t row, const NodeFactors&, const CovarianceMatrix& separator)>;
+  void covariances_down(const VisitTileCovariance& before, const VisitCovariance& visit);
+  // The covariance of all frames together. Needs a sweep of its own. Empty for a large block.
+  CovarianceMatrix frame_covariance_of_small_block();
   // Runs a sweep down with the present factors. Returns the steps of the unknowns of this rank's tiles, without points.
   std::vector<TileStep> steps_down(const Sweep& sweep);
   // Forms the trial states of these steps and calls `visit` for one tile after the other.
@@ -173,8 +186,9 @@ class MergeTreeRunner : public TreeRunner {
   std::vector<std::int64_t>
       sent_subtrees_;  // recorded subtrees of this sweep whose update has left this rank's own subtrees
   BlockGauge gauge_;
-  HeldAgainstPriors held_before_;  // of the last sweep up
-  bool with_columns_ = false;      // the sweep has the further right-hand sides of a free datum
+  HeldAgainstPriors held_before_;               // of the last sweep up
+  DatumColumns columns_ = DatumColumns::kNone;  // the further right-hand sides of the sweep
+  UnknownList block_frames_;                    // of the whole block, where columns_ is kFrames
   bool check_seams_ = false;
   bool posterior_expected_ = false;
   std::optional<SubtreeSums> last_sweep_;  // sums of a sweep at the present state that stored the data of the posterior

@@ -3,6 +3,7 @@
 //
 // A sweep up with lambda = 0 makes the factors, with the seam checks on its way. Where the datum is free, this sweep
 // has the right-hand sides W N of inner_constraints.h, and a sweep down of steps gives Z = C W N and the sums M and K.
+// In a small block a sweep after it has the columns of all frames.
 // The covariances then come down the tree: each front gets C_PP from its parent and gives C_EE and C_PE
 // (front_covariance.cpp). The covariances of a tile are not kept after its visit, so that those of the whole block are
 // never in memory together.
@@ -15,27 +16,13 @@
 
 namespace megablock {
 
-MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& visit) {
-  Posterior posterior;
-  check_seams_ = true;
-  if (last_sweep_) {
-    posterior.sums = *std::exchange(last_sweep_, std::nullopt);
-  } else {
-    find_gauges();  // frames, cameras and mounts may have moved with other tiles
-    gauge_ = gather_gauge();
-    with_columns_ = gauge_.free();
-    posterior.sums = condense_all(0).sums;
-  }
-  posterior.gauge = gauge_;
+void MergeTreeRunner::covariances_down(const VisitTileCovariance& before, const VisitCovariance& visit) {
   std::vector<TileStep> steps(tiles_.size());
   InnerSums inner_constraints;
-  if (with_columns_) {
+  if (columns_ != DatumColumns::kNone) {
     steps = steps_down(0);
     inner_constraints = gather_inner_sums(steps);
   }
-
-  std::vector<TileCheck> checks(tiles_.size());
-  std::vector<ObservationTable> tables(tiles_.size());
   for (std::int64_t n = plan_.root(); n >= 0; --n) {
     if (!mine(n)) continue;
     CovarianceMatrix separator = from_parent<CovarianceMatrix>(n);
@@ -53,24 +40,53 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
     const TilePlan& plan = tile_plans_[row];
     const Step& step = steps[row].unknowns;
     // This comes before the covariances of the tile, which take over the memory of `separator`.
-    checks[row] = check_tile(tile.tile, factors.condensed, separator, seam_probability());
+    before(row, factors, separator);
     TileCovariance covariance =
         covariance_tile(tile.problem, plan, tile.state, factors.tile, std::move(separator), datum_of(row), step);
     factors_.discard(n);
-    if (with_columns_)
+    if (columns_ != DatumColumns::kNone)
       to_inner_constraints(gauge_, inner_constraints, tile.tile, tile.problem, plan, tile.state, step, covariance);
-    tables[row] = covariance.observations;
-    if (visit) visit(tile, covariance);
+    visit(tile, covariance);
   }
   ranks_.flush_sends();
-  with_columns_ = check_seams_ = false;
+}
+
+MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& visit) {
+  Posterior posterior;
+  check_seams_ = true;
+  if (last_sweep_) {
+    posterior.sums = *std::exchange(last_sweep_, std::nullopt);
+  } else {
+    find_gauges();  // frames, cameras and mounts may have moved with other tiles
+    gauge_ = gather_gauge();
+    if (gauge_.free()) columns_ = DatumColumns::kSimilarities;
+    posterior.sums = condense_all(0).sums;
+  }
+  posterior.gauge = gauge_;
+
+  std::vector<TileCheck> checks(tiles_.size());
+  std::vector<ObservationTable> tables(tiles_.size());
+  std::size_t last = 0;
+  covariances_down(
+      [&](std::size_t row, const NodeFactors& factors, const CovarianceMatrix& separator) {
+        last = row;
+        checks[row] = check_tile(tiles_.number(row), factors.condensed, separator, seam_probability());
+      },
+      [&](const RankTile& tile, const TileCovariance& covariance) {
+        tables[last] = covariance.observations;
+        if (visit) visit(tile, covariance);
+      });
+  check_seams_ = false;
+  columns_ = DatumColumns::kNone;
+  const std::vector<SeamReport> seams = seams_;  // a further sweep clears them
+  posterior.frames = frame_covariance_of_small_block();
   posterior.tile_checks = gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, checks);
   for (const ObservationTable& table : gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, tables))
     posterior.observations.add(table);
 
   // Each rank knows the seams of its own nodes; all get all of them, in the order of the nodes.
   ByteWriter writer;
-  writer.values(seams_);
+  writer.values(seams);
   for (const Bytes& bytes : ranks_.gather_all(writer.take())) {
     ByteReader reader(bytes);
     const std::vector<SeamReport> some = reader.values<SeamReport>();

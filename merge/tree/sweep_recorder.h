@@ -31,7 +31,8 @@ class SweepRecorder {
   // The properties of a sweep, besides the state, on which its bits depend.
   struct Kind {
     Sweep sweep;
-    bool seams = false, columns = false;
+    bool seams = false;
+    std::int32_t columns = 0;  // a DatumColumns
   };
 
   // `seconds`: time between two records; 0: a record after every subtree. `stop_requested` says whether the process is

@@ -214,7 +214,8 @@ UpReport MergeTreeRunner::condense_all(const Sweep& sweep) {
   factors_.clear();
   seams_.clear();
   sent_subtrees_.clear();
-  const SweepRecord before = recorder_ ? recorder_->begin({sweep, check_seams_, with_columns_}) : SweepRecord();
+  const SweepRecord before =
+      recorder_ ? recorder_->begin({sweep, check_seams_, static_cast<std::int32_t>(columns_)}) : SweepRecord();
   const std::vector<bool> done = resume(before);
   std::vector<std::int64_t> leaves;
   for (std::int64_t n = 0; n < std::ssize(plan_.nodes); ++n)

@@ -28,8 +28,8 @@ class LoneTile : public TreeRunner {
   UpReport up(const Sweep& sweep) override {
     // The datum of the present state, as in the sweeps over a block.
     gauge_ = make_gauge({tile_gauge(problem_, plan_, state_)}, sweep.held_before);
-    TileCondensation condensed =
-        condense_tile(problem_, plan_, state_, sweep, tile_datum(gauge_, 0, problem_, plan_, state_, false));
+    TileCondensation condensed = condense_tile(problem_, plan_, state_, sweep,
+                                               tile_datum(gauge_, 0, problem_, plan_, state_, DatumColumns::kNone));
     factor_ = std::move(condensed.factor);
     return {std::move(condensed.update.sums), gauge_.against_priors()};
   }

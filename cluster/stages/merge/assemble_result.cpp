@@ -65,6 +65,8 @@ void list_failures(const JobRecord& record, const std::map<FrameIndex, std::stri
 
 void scale_covariances(BlockResult& result, double factor) {
   for (auto& covariance : result.frame_covariance) covariance *= factor;
+  for (auto& covariance : result.aligned_covariance) covariance *= factor;
+  result.joint_covariance.matrix *= factor;
   for (auto& covariance : result.camera_covariance) covariance *= factor;
   for (auto& rig : result.mount_covariance)
     for (auto& covariance : rig) covariance *= factor;
@@ -84,6 +86,8 @@ BlockResult assemble_result(const Job& job, const JobRecord& record, Block& bloc
   result.state = std::move(outcome.state);
   result.tiles = tiles;
   result.frame_covariance = std::move(outcome.frame_covariance);
+  result.aligned_covariance = std::move(outcome.aligned_covariance);
+  result.joint_covariance = std::move(outcome.joint_covariance);
   result.camera_covariance = std::move(outcome.camera_covariance);
   result.mount_covariance = std::move(outcome.mount_covariance);
   append_control(result, parts);

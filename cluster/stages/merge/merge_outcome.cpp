@@ -55,6 +55,7 @@ void write_covariances(const std::string& path, const TileProblem& problem, cons
   ByteWriter writer;
   writer.values(problem.frames);
   write_matrices(writer, covariance.frames);
+  write_matrices(writer, covariance.aligned_frames);
   writer.values(problem.mounts);
   write_matrices(writer, covariance.mounts);
   writer.values(problem.cameras);
@@ -75,6 +76,8 @@ void read_covariances(const std::string& path, MergeOutcome& outcome) {
   const auto frames = reader.values<FrameIndex>();
   const auto of_frames = read_matrices<BlockResult::Matrix6>(reader);
   for (std::size_t f = 0; f < frames.size(); ++f) take_first(of_frames[f], outcome.frame_covariance[frames[f]]);
+  const auto aligned = read_matrices<BlockResult::Matrix6>(reader);
+  for (std::size_t f = 0; f < aligned.size(); ++f) take_first(aligned[f], outcome.aligned_covariance[frames[f]]);
   const auto mounts = reader.values<MountId>();
   const auto of_mounts = read_matrices<BlockResult::Matrix6>(reader);
   for (std::size_t m = 0; m < mounts.size(); ++m)
@@ -85,11 +88,20 @@ void read_covariances(const std::string& path, MergeOutcome& outcome) {
 
 void read_covariances(const Job& job, const Tiles& tiles, MergeOutcome& outcome) {
   outcome.frame_covariance.assign(outcome.state.frames.size(), BlockResult::Matrix6::Zero());
+  outcome.aligned_covariance = outcome.frame_covariance;
   for (const Intrinsics& camera : outcome.state.cameras)
     outcome.camera_covariance.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
   for (const std::vector<Pose>& rig : outcome.state.mounts)
     outcome.mount_covariance.emplace_back(rig.size(), BlockResult::Matrix6::Zero());
   for (std::int64_t tile = 0; tile < tiles.tile_count; ++tile) read_covariances(covariance_path(job, tile), outcome);
+}
+
+BlockResult::JointCovariance joint_covariance(const CovarianceMatrix& frames) {
+  BlockResult::JointCovariance joint;
+  for (const Unknown& frame : frames.unknowns) joint.frames.emplace_back(frame.id.index);
+  const auto n = static_cast<Eigen::Index>(total_dimension(frames.unknowns));
+  joint.matrix = Eigen::Map<const Eigen::MatrixXd>(frames.matrix.data(), n, n);
+  return joint;
 }
 
 }  // namespace
@@ -168,6 +180,7 @@ MergeOutcome make_outcome(const Job& job, Adjusted& adjusted, const Tiles& tiles
   MergeOutcome outcome;
   outcome.state = std::move(adjusted.state);
   read_covariances(job, tiles, outcome);
+  outcome.joint_covariance = joint_covariance(adjusted.posterior.frames);
   const SubtreeSums& sums = adjusted.posterior.sums;
   outcome.chi2 = sums.weighted_squares;
   outcome.degrees_of_freedom =
@@ -176,6 +189,7 @@ MergeOutcome make_outcome(const Job& job, Adjusted& adjusted, const Tiles& tiles
   outcome.global_iterations = adjusted.position.global.accepted;
   outcome.newton_decrement = std::sqrt(sums.decrement_squared);
   const BlockGauge& gauge = adjusted.posterior.gauge;
+  if (!gauge.free()) outcome.aligned_covariance = {};
   outcome.gauge = judge_gauge(sums, gauge, names_of(job.block)).text;
   for (const BlockComponent& part : gauge.components)
     if (!part.columns.empty()) {

@@ -14,7 +14,8 @@ namespace megablock {
 // Figures of the merge that do not belong to a tile.
 struct MergeOutcome {
   BlockState state;
-  IndexedVector<FrameIndex, BlockResult::Matrix6> frame_covariance;
+  IndexedVector<FrameIndex, BlockResult::Matrix6> frame_covariance, aligned_covariance;
+  BlockResult::JointCovariance joint_covariance;
   IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;
   IndexedVector<RigIndex, std::vector<BlockResult::Matrix6>> mount_covariance;
   double chi2 = 0;

@@ -43,6 +43,7 @@ void write_result_files(const JobStore& store, PagedTables& tables, std::uint64_
   std::filesystem::create_directories(store.path("result"));
   map_blocks_from(kColumn);
   tables.put(result.frame_covariance);
+  tables.put(result.aligned_covariance);
   const auto release = [&tables] { tables.release(); };
   const auto release_all = [&tables] {
     tables.release();

@@ -128,6 +128,15 @@ std::string attitudes_section(const BlockResult& result, const Figures& f) {
           "</div></div>");
 }
 
+namespace {
+
+std::string about_datum(const BlockResult& result) {
+  if (!result.gauge.starts_with("free")) return "";
+  return " The datum is free: these are the sigmas after the similarity that fits the poses of all images best.";
+}
+
+}  // namespace
+
 std::string accuracy_section(const BlockResult& result, const Figures& f, const std::function<void()>& after_reading) {
   if (!std::isfinite(f.sigma_east.median) && !std::isfinite(f.point_sigma_horizontal.median)) return "";
   const double s0 = result.degrees_of_freedom > 0 ? std::sqrt(std::max(0.0, result.variance_factor)) : kUnknown;
@@ -154,7 +163,7 @@ std::string accuracy_section(const BlockResult& result, const Figures& f, const 
       paragraph(std::string("Standard deviations from the covariance of the whole block, ") +
                 (result.sigma_scaled ? "all multiplied by σ₀ a posteriori."
                                      : "for σ₀ = 1; only those of the last column are multiplied by σ₀ a posteriori.") +
-                " Rotation: the largest of the three axes.") +
+                " Rotation: the largest of the three axes." + about_datum(result)) +
           table.html("compact") + ellipses_figure(result, f, after_reading));
 }
 

@@ -40,6 +40,8 @@ BlockResult example_result() {
   for (int c = 0; c < 2; ++c) result.camera_covariance.push_back(symmetric<Eigen::Matrix<double, 8, 8>>(c + 0.5));
   result.mount_covariance.push_back({BlockResult::Matrix6::Zero(), symmetric<BlockResult::Matrix6>(0.1)});
   result.mount_covariance.push_back({BlockResult::Matrix6::Zero()});
+  for (int f = 0; f < 4; ++f) result.aligned_covariance.push_back(symmetric<BlockResult::Matrix6>(f + 3));
+  result.joint_covariance = {{FrameIndex(1), FrameIndex(3)}, symmetric<Eigen::Matrix<double, 12, 12>>(2)};
   result.tracks = example_tracks();
   result.points = {{1, 2, 3}, {nan, nan, nan}, {4, 5, 6}};
   result.point_covariance = {symmetric<Eigen::Matrix3d>(1), symmetric<Eigen::Matrix3d>(nan),
@@ -89,6 +91,9 @@ TEST(ResultFile, EverythingComesBack) {
     EXPECT_EQ(back.camera_covariance[c], result.camera_covariance[c]);
   }
   EXPECT_EQ(back.mount_covariance, result.mount_covariance);
+  EXPECT_TRUE(back.aligned_covariance == result.aligned_covariance);
+  EXPECT_EQ(back.joint_covariance.frames, result.joint_covariance.frames);
+  EXPECT_EQ(back.joint_covariance.matrix, result.joint_covariance.matrix);
   EXPECT_EQ(back.boundary, result.boundary);
   EXPECT_EQ(back.tiles.tile_of_frame, result.tiles.tile_of_frame);
   EXPECT_EQ(back.tracks.id, result.tracks.id);

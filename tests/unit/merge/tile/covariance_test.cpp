@@ -106,7 +106,42 @@ void expect_inner_covariances(const TiledBlock& block, MergeInMemory& runner, Ei
   const Eigen::MatrixXd weighted = w.asDiagonal() * null;
   const Eigen::MatrixXd s =
       Eigen::MatrixXd::Identity(n, n) - null * solve_symmetric(null.transpose() * weighted, weighted.transpose());
-  expect_covariances(block, covariances, system, s * any * s.transpose(), tolerance);
+  const Eigen::MatrixXd inner = s * any * s.transpose();
+  expect_covariances(block, covariances, system, inner, tolerance);
+
+  // All frames together, in the order of the table of frames.
+  const CovarianceMatrix& joint = runner.frame_covariance();
+  ASSERT_EQ(joint.unknowns.size(), block.whole.frames.size());
+  std::vector<Eigen::Index> rows;
+  for (const std::int64_t column : system.frame_column)
+    for (Eigen::Index k = 0; k < 6; ++k) rows.push_back(column + k);
+  const Eigen::MatrixXd expected = inner(rows, rows);
+  const Eigen::Map<const Eigen::MatrixXd> ours(joint.matrix.data(), expected.rows(), expected.cols());
+  const Eigen::VectorXd unit = expected.diagonal().cwiseSqrt().cwiseInverse();
+  EXPECT_LE((unit.asDiagonal() * (ours - expected) * unit.asDiagonal()).cwiseAbs().maxCoeff<Eigen::PropagateNaN>(),
+            tolerance);
+
+  // After the best-fit similarity of the positions, which is fitted part by part. With seven free directions the null
+  // space is that of the similarities of one part.
+  if (defect != 7) return;
+  Eigen::VectorXd positions = w;
+  for (const std::int64_t column : system.frame_column) positions.segment<3>(column).setZero();
+  const Eigen::MatrixXd weighted_positions = positions.asDiagonal() * null;
+  const Eigen::MatrixXd fit =
+      Eigen::MatrixXd::Identity(n, n) -
+      null * solve_symmetric(null.transpose() * weighted_positions, weighted_positions.transpose());
+  const Eigen::MatrixXd aligned = fit * any * fit.transpose();
+  for (std::size_t t = 0; t < covariances.size(); ++t)
+    for (std::size_t f = 0; f < covariances[t].frames.size(); ++f) {
+      const Eigen::Index column = system.frame_column[TiledBlock::row(block.whole.frames, block.problems[t].frames[f])];
+      const Eigen::MatrixXd own = aligned.block<6, 6>(column, column);
+      const Eigen::VectorXd scale = own.diagonal().cwiseSqrt().cwiseInverse();
+      EXPECT_LE((scale.asDiagonal() * (covariances[t].aligned_frames[f] - own) * scale.asDiagonal())
+                    .cwiseAbs()
+                    .maxCoeff<Eigen::PropagateNaN>(),
+                tolerance)
+          << "tile " << t << " frame " << f;
+    }
 }
 
 class Covariances : public testing::TestWithParam<SimulationOptions::Scene> {};
