@@ -181,6 +181,13 @@ struct TileState {
   std::vector<Eigen::Vector3d> points;
 };
 
+// The part of a block's observations that an adjustment takes, for a split test (half.h).
+enum class Half : std::int32_t { kNone = 0, kTiePoints1 = 1, kTiePoints2 = 2, kImages1 = 3, kImages2 = 4 };
+struct HalfChoice {
+  Half half = Half::kNone;
+  std::int64_t division = 0;  // number of the division: each divides the observations in another way
+};
+
 // A loss acts on the length of a residual of n numbers. Of good observations, the share beyond 3 sigmas is 0.3 % for
 // one number (lines), 1.1 % for two (images, verticals) and 2.9 % for three (positions, control, attitudes). With the
 // corner at three sigmas, nearly all good observations therefore keep the weight 1. docs/developer/decisions.md tells
@@ -197,6 +204,7 @@ struct ObservationOptions {
   RobustLoss vertical_loss{RobustLoss::Kind::kCauchy, 3.0};
   bool use_position_priors = true;
   bool use_attitude_priors = true;
+  HalfChoice half;     // no option of the project file
   void check() const;  // throws InputError
 };
 

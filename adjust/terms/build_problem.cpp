@@ -14,6 +14,7 @@
 #include <limits>
 #include <utility>
 
+#include "adjust/problem/half.h"
 #include "adjust/terms/line_terms.h"
 #include "adjust/terms/vertical_terms.h"
 #include "io/base/error.h"
@@ -45,7 +46,14 @@ class TileBuilder {
  public:
   TileBuilder(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile, const TrackSet& owned,
               const ObservationOptions& options, const RowsOfTile& rows)
-      : block_(block), state_(state), tiles_(tiles), tile_(tile), owned_(owned), options_(options), rows_(rows) {}
+      : block_(block),
+        state_(state),
+        tiles_(tiles),
+        tile_(tile),
+        owned_(owned),
+        options_(options),
+        rows_(rows),
+        in_half_(frames_of_half(block, options.half.half)) {}
 
   TileProblem build() {
     problem_.image_sigma_px = options_.image_sigma_px;
@@ -68,6 +76,7 @@ class TileBuilder {
     add_verticals();
     add_camera_priors();
     add_mount_priors();
+    divide_priors(options_.half, problem_);
     return std::move(problem_);
   }
 
@@ -164,9 +173,11 @@ class TileBuilder {
     return mask;
   }
 
-  // `kept` begins with 1 where the image has a row, that is, a pose.
-  void add_observation(ImageIndex image, double x, double y, double sigma) {
-    const std::int32_t row = row_of(image_table_, image);
+  // `kept` begins with 1 where the image has a row, that is, a pose. An observation of the other half of a split test
+  // has none.
+  void add_observation(ImageIndex image, double x, double y, double sigma, bool taken = true) {
+    taken = taken && (in_half_.empty() || in_half_[static_cast<std::size_t>(block_.images[image].frame.value)]);
+    const std::int32_t row = taken ? row_of(image_table_, image) : -1;
     problem_.image.push_back(LocalImage(row));
     problem_.x.push_back(x);
     problem_.y.push_back(y);
@@ -174,11 +185,24 @@ class TileBuilder {
     problem_.kept.push_back(row >= 0);
   }
 
+  // Whether a track is in the half of a split test. Parts of a track that was split (track_parts.h) have its index and
+  // follow each other. They are in one half, that of the first of all their images.
+  bool takes(std::int64_t t) {
+    if (options_.half.half == Half::kNone || (t > 0 && owned_.id[t] == owned_.id[t - 1])) return taken_;
+    ImageIndex first = owned_.image[owned_.begin[t]];
+    for (std::int64_t part = t; part < owned_.track_count() && owned_.id[part] == owned_.id[t]; ++part)
+      for (std::int64_t row = owned_.begin[part]; row < owned_.begin[part + 1]; ++row)
+        first = std::min(first, owned_.image[row]);
+    taken_ = takes_track(options_.half, first);
+    return taken_;
+  }
+
   void add_track(std::int64_t t) {
     problem_.points.push_back({PointRole::kTie, owned_.id[t].value});
+    const bool taken = takes(t);
     for (std::int64_t row = owned_.begin[t]; row < owned_.begin[t + 1]; ++row)
       add_observation(owned_.image[row], from_fixed_pixel(owned_.x[row]), from_fixed_pixel(owned_.y[row]),
-                      options_.image_sigma_px);
+                      options_.image_sigma_px, taken);
     problem_.begin.push_back(problem_.observation_count());
   }
 
@@ -283,6 +307,8 @@ class TileBuilder {
   const TrackSet& owned_;
   const ObservationOptions& options_;
   const RowsOfTile& rows_;
+  const std::vector<std::uint8_t> in_half_;  // [frames] of a half of the images, or empty
+  bool taken_ = true;                        // whether the present track is in the half
   TileProblem problem_;
   std::vector<std::int64_t> control_points_;
   std::vector<BlockLineTerm> lines_;

@@ -28,6 +28,7 @@
 #include "cluster/process/exit_codes.h"
 #include "cluster/process/version.h"
 #include "cluster/stages/pipeline.h"
+#include "cluster/stages/split_test.h"
 #include "cluster/status/status.h"
 #include "cluster/terminal/help_text.h"
 #include "cluster/terminal/option_checks.h"
@@ -293,17 +294,37 @@ void add_report(CLI::App& app, Action& action) {
   });
 }
 
-void add_evaluate(CLI::App& app, Action& action) {
+int print_split_test(const RunOptions& run, const SplitTestOptions& test, bool json, Communicator& ranks) {
+  on_first_rank(ranks, [&] { return finished_result(run.directory); });
+  const HalvesComparison halves = run_split_test(run, test, ranks);
+  if (ranks.rank() == 0) std::printf("%s\n", (json ? to_json(halves) : to_text(halves)).c_str());
+  return kExitDone;
+}
+
+void add_evaluate(CLI::App& app, Action& action, Communicator& ranks) {
   struct Options {
-    std::string job, truth;
-    bool json = false;
+    std::string truth;
+    bool json = false, halves = false;
     EvaluateOptions evaluation;
+    RunOptions run;
+    SplitTestOptions test;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("evaluate", "Compare a job with known poses");
-  command->footer("Example: megablock evaluate job truth.csv --json");
-  command->add_option("job", options->job, "Job directory")->required();
-  command->add_option("truth", options->truth, "Poses: truth.csv of 'simulate', or any pose CSV")->required();
+  options->run.quiet = true;
+  CLI::App* command = app.add_subcommand("evaluate", "Compare a job with known poses, or halves of it with each other");
+  command->footer("Example: megablock evaluate job truth.csv --json\n         megablock evaluate job --halves");
+  command->add_option("job", options->run.directory, "Job directory")->required();
+  auto* truth = command->add_option("truth", options->truth, "Poses: truth.csv of 'simulate', or any pose CSV");
+  command
+      ->add_flag("--halves", options->halves,
+                 "Adjust the job again from two halves of its tie points, and for the camera of its images, and print "
+                 "the differences over their sigmas")
+      ->excludes(truth);
+  command->add_option("--divisions", options->test.divisions, "Divisions of the tie points for --halves")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_option("--threads", options->run.threads, "Threads per rank for --halves; 0 = cores of the host / ranks")
+      ->check(threads());
   EvaluateOptions& of_truth = options->evaluation;
   command->add_option("--truth-sigma", of_truth.truth_position_sigma_m, "Sigma of the true positions, m per axis")
       ->check(CLI::NonNegativeNumber);
@@ -312,12 +333,17 @@ void add_evaluate(CLI::App& app, Action& action) {
   command->add_flag("--scale-sigma", options->evaluation.scale_sigma,
                     "Multiply the posterior sigmas by the a-posteriori sigma");
   command->add_flag("--json", options->json, "Figures as JSON");
-  command->callback([=, &action] {
-    action = [options] {
-      const Evaluation evaluation =
-          evaluate(read_result_without_tracks(finished_result(options->job)), options->truth, options->evaluation);
-      std::printf("%s\n", (options->json ? to_json(evaluation) : to_text(evaluation)).c_str());
-      return kExitDone;
+  command->callback([=, &action, &ranks] {
+    if (options->truth.empty() && !options->halves)
+      throw CLI::ValidationError("evaluate", "give known poses, or --halves");
+    action = [options, &ranks] {
+      if (options->halves) return print_split_test(options->run, options->test, options->json, ranks);
+      return exit_code_on_first_rank(ranks, [&] {
+        const Evaluation evaluation = evaluate(read_result_without_tracks(finished_result(options->run.directory)),
+                                               options->truth, options->evaluation);
+        std::printf("%s\n", (options->json ? to_json(evaluation) : to_text(evaluation)).c_str());
+        return kExitDone;
+      });
     };
   });
 }
@@ -456,7 +482,7 @@ int command_line(int argc, char** argv) {
     add_export(app, by_one);
     add_measurements(app, by_one);
     add_import(app, by_one);
-    add_evaluate(app, by_one);
+    add_evaluate(app, action, ranks);
     add_simulate(app, by_one);
     add_check(app, by_one);
     if (const std::optional<int> code = answer_without_command(app, argc, argv, ranks.rank() == 0)) return *code;

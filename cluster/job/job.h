@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "adjust/problem/tile_problem.h"
 #include "cluster/job/job_options.h"
 #include "cluster/job/paged_tables.h"
 #include "cluster/mpi/communicator.h"
@@ -27,6 +28,7 @@ struct RunOptions {
   bool strict = false;      // the first failed unit ends the run
   bool quiet = false;       // no progress
   std::string last_stage;   // stop after this stage; empty = all
+  HalfChoice half;          // of a split test: `directory` is a finished job then, whose project is not read again
   JobLogOptions log;        // options of the log of each rank
 };
 

@@ -272,7 +272,11 @@ void add_to_hash(Hasher& hasher, const OrientationOptions& options) {
   hash_options(hasher, options.observations);
 }
 void add_to_hash(Hasher& hasher, const EnvironmentOptions& options) { hash_options(hasher, options); }
-void add_to_hash(Hasher& hasher, const AdjustOptions& options) { hash_options(hasher, options); }
+void add_to_hash(Hasher& hasher, const AdjustOptions& options) {
+  hash_options(hasher, options);
+  if (const HalfChoice& choice = options.observations.half; choice.half != Half::kNone)
+    hasher.add(choice.half).add(choice.division);
+}
 void add_to_hash(Hasher& hasher, const MergeSettings& options) { hash_options(hasher, options); }
 
 }  // namespace megablock

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <functional>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -263,6 +265,12 @@ JobLog open_log(const RunOptions& options, int rank) {
   return log;
 }
 
+// The job.json of a job.
+std::string job_text(const JobStore& store) {
+  std::ifstream file(store.path("job.json"));
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
 // Runs the stages. An error that ends the run is written as the last line of the log.
 void run_logged(const Job& job, const JobRecord& record, const std::function<void()>& stages) {
   try {
@@ -288,6 +296,11 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
   std::optional<JobLock> lock;
   JobLog log;
   const std::string text = on_first_rank(ranks, [&] {
+    if (run_options.half.half != Half::kNone) {  // the job is a copy of a finished one (cluster/stages/split_test.h)
+      lock.emplace(store);
+      log = open_log(run_options, ranks.rank());
+      return job_text(store);
+    }
     Project project = read_whole_project(run_options);
     refuse_other_folders(store);
     store.create();
@@ -305,10 +318,12 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
   JobBlock own{read_block_without_names(store.verified_path("block.h5")), PagedTables(store.directory())};
   page_tables(own.block, own.tables);
   if (tie_points.empty()) restore_names(store, own);
+  JobOptions settings = read_options(written.settings());
+  settings.adjustment.observations.half = run_options.half;
   const Job job{.options = completed(run_options, ranks),
                 .ranks = ranks,
                 .store = store,
-                .settings = read_options(written.settings()),
+                .settings = std::move(settings),
                 .log = std::move(log),
                 .block = own.block,
                 .tables = own.tables,

@@ -1,0 +1,56 @@
+#!/usr/bin/env python3
+"""Tests `evaluate --halves`: on simulated blocks the differences of the halves have their sigmas, free and with positions,
+in one tile and in several; the job stays as it was. usage: split_test.py MEGABLOCK [SEEDS]"""
+import json
+import math
+import pathlib
+import sys
+import tempfile
+
+from program import BAD_INPUT, megablock
+
+SEEDS = int(sys.argv[1]) if len(sys.argv) > 1 else 6  # program.py has taken the program
+FIGURES = [(kind, "formal") for kind in ("positions", "rotations", "cameras")]
+
+
+def ratio(halves, kind, sigma):
+    key = f"over_{sigma}_sigma"
+    return halves[kind][0][key] if kind == "cameras" else halves[kind][key]
+
+
+def main():
+    with tempfile.TemporaryDirectory() as name:
+        folder, sums = pathlib.Path(name), {}
+        for seed in range(1, SEEDS + 1):
+            for gps in 0, 0.05:
+                block = folder / f"{seed}-{gps}"
+                megablock("simulate", "--frames", 24, "--points-per-frame", 150, "--seed", seed, "--gps-sigma", gps,
+                          "--check-points", 3, "--control-points", 4 if gps else 0, "-o", block)
+                if seed % 2:
+                    with open(block / "block.yaml", "a") as project:
+                        project.write("tiles: {tile_max_frames: 8}\n")
+                job = block / "job"
+                megablock("run", block / "block.yaml", "-j", job, "-q")
+                digest = megablock("status", job, "--digest")
+                text = megablock("evaluate", job, "--halves", "--json")
+                halves = json.loads(text)
+                # An image at the edge may see only tracks that begin in images of one half.
+                assert halves["aligned"] == (gps == 0) and halves["frames_missing"] <= 2, halves
+                assert not halves["note"], halves
+                assert megablock("status", job, "--digest") == digest and not (job / "halves").exists()
+                for figure in FIGURES:
+                    sums.setdefault((gps, *figure), []).append(ratio(halves, *figure) ** 2)
+                if gps:
+                    sums.setdefault((gps, "points", "formal"), []).append(halves["points"]["over_formal_sigma"] ** 2)
+        wrong = []
+        for key, squares in sums.items():
+            mean = math.sqrt(sum(squares) / len(squares))
+            print(f"gps {key[0]}: difference of {key[1]} over {key[2]} sigma {mean:.3f} ({len(squares)} blocks)")
+            # The poses of a block bend together, so that a ratio scatters by a fifth from block to block.
+            if abs(mean - 1) > 0.6 / math.sqrt(len(squares)):
+                wrong.append(key)
+        assert not wrong, wrong
+        assert "--halves" in megablock("evaluate", job, expect=BAD_INPUT)
+
+
+main()
