@@ -232,7 +232,7 @@ class Chooser {
       if (weak) list += " (mostly by its prior)";
     }
     return "estimated: " + (estimated.empty() ? "nothing" : estimated) + (held.empty() ? "" : "; held: " + held) +
-           fmt::format("; %: by how much the squared error of left-out {} rises without it",
+           fmt::format("; in brackets: the rise of the squared error of left-out {} without it",
                        few_images() ? "tie points" : "images");
   }
 
