@@ -3,8 +3,6 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <cctype>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -34,6 +32,7 @@
 #include "cluster/terminal/option_checks.h"
 #include "cluster/terminal/output_check.h"
 #include "cluster/terminal/terminal_text.h"
+#include "cluster/terminal/wrong_usage.h"
 #include "io/base/error.h"
 #include "io/base/file_error.h"
 #include "io/evaluation/evaluate.h"
@@ -44,7 +43,6 @@
 #include "io/report/report.h"
 #include "io/result/check.h"
 #include "io/store/job/job_lock.h"
-#include "io/text/settings_reader.h"
 
 namespace megablock {
 
@@ -351,39 +349,6 @@ void add_evaluate(CLI::App& app, Action& action, Communicator& ranks) {
   });
 }
 
-std::vector<std::string> command_names(const CLI::App& app) {
-  std::vector<std::string> names;
-  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
-    names.push_back(command->get_name());
-  return names;
-}
-
-bool is_unknown_command(const CLI::App& app, const std::string& name) {
-  const std::vector<std::string> known = command_names(app);
-  return !name.starts_with("-") && std::find(known.begin(), known.end(), name) == known.end();
-}
-
-std::string unknown_command_message(const CLI::App& app, const std::string& name) {
-  const std::string nearest = nearest_name(name, command_names(app));
-  return "megablock: unknown command '" + name + "'; " +
-         (nearest.empty() ? "see 'megablock --help'" : "did you mean '" + nearest + "'?");
-}
-
-// A misspelled option is named first, because a missing option may be the one that was meant.
-std::string usage_message(const CLI::App& command, const std::string& name, const CLI::Error& error) {
-  std::vector<std::string> known;
-  for (const CLI::Option* option : command.get_options([](const CLI::Option* o) { return o->nonpositional(); }))
-    for (const std::string& word : option->get_lnames()) known.push_back("--" + word);
-  for (const std::string& argument : command.remaining()) {
-    if (!argument.starts_with("-")) continue;
-    const std::string option = argument.substr(0, argument.find('='));
-    const std::string nearest = option.starts_with("--") ? nearest_name(option, known) : "";
-    return "megablock: argument '" + option + "' was not expected; " +
-           (nearest.empty() ? "" : "did you mean '" + nearest + "'? ") + "see '" + name + " --help'\n";
-  }
-  return "megablock: " + std::string(error.what()) + "; see '" + name + " --help'\n";
-}
-
 // Answers 'help', no command at all, and an unknown command. Returns the exit code, the same on every rank; only one
 // rank writes the message.
 std::optional<int> answer_without_command(const CLI::App& app, int argc, char** argv, bool speaks) {
@@ -400,31 +365,6 @@ std::optional<int> answer_without_command(const CLI::App& app, int argc, char** 
 int exit_code_of(const std::exception& error) {
   if (dynamic_cast<const Interrupted*>(&error)) return kExitInterrupted;
   return dynamic_cast<const InputError*>(&error) ? kExitBadInput : kExitFailedUnits;
-}
-
-// " min frames " of "--min-frames", "min_frames".
-std::string as_words(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return !std::isalnum(c); }, ' ');
-  return " " + text + " ";
-}
-
-// Names a wrong value as the user gave it: "--min-frames 9: min_frames must be 3 or 4".
-std::string with_given_value(const CLI::App& app, const std::string& message) {
-  const std::size_t end = message.find(" must ");
-  if (end == std::string::npos) return message;
-  const std::string subject = as_words(message.substr(0, end));
-  std::string given;
-  std::size_t longest = 0;
-  for (const CLI::App* command : app.get_subcommands())
-    for (const CLI::Option* option : command->get_options([](const CLI::Option* o) { return o->nonpositional(); }))
-      for (const std::string& name : option->get_lnames()) {
-        const bool wanted = option->count() > 0 && option->get_type_size() > 0 && name.size() > longest;
-        if (!wanted || subject.find(as_words(name)) == std::string::npos) continue;
-        given = "--" + name + " " + option->results().back() + ": ";
-        longest = name.size();
-      }
-  return given + message;
 }
 
 // Runs the action. An error that all ranks agree on is reported once. An error of a single rank ends the others, which

@@ -18,8 +18,8 @@ constexpr std::ptrdiff_t kFewestOfGroup = 4;  // positions of a group
 constexpr double kOfDeviation = 6, kOfFew = 6, kOfStated = 3, kEmpty = 0.5;
 constexpr std::size_t kNamedOfGroup = 5;
 
-struct Height {  // of one axis
-  double value = 0;
+struct AxisResidual {  // observed minus adjusted, along one axis
+  double metres = 0;
   FrameIndex frame;
 };
 
@@ -27,23 +27,23 @@ struct Side {
   double mean = 0, deviation = 0;
 };
 
-Side side_of(std::span<const Height> heights) {
+Side side_of(std::span<const AxisResidual> along) {
   Side side;
-  const auto n = static_cast<double>(heights.size());
-  for (const Height& height : heights) side.mean += height.value / n;
-  for (const Height& height : heights) side.deviation += std::pow(height.value - side.mean, 2) / (n - 1);
+  const auto n = static_cast<double>(along.size());
+  for (const AxisResidual& r : along) side.mean += r.metres / n;
+  for (const AxisResidual& r : along) side.deviation += std::pow(r.metres - side.mean, 2) / (n - 1);
   side.deviation = std::sqrt(side.deviation);
   return side;
 }
 
-// The number of values below the cut with the least squares within its sides; `heights` ascend.
-std::ptrdiff_t best_cut(std::span<const Height> heights) {
-  const auto n = std::ssize(heights);
+// The number of values below the cut with the least squares within its sides; `along` ascend.
+std::ptrdiff_t best_cut(std::span<const AxisResidual> along) {
+  const auto n = std::ssize(along);
   double all = 0, below = 0, best = -1;
-  for (const Height& height : heights) all += height.value;
+  for (const AxisResidual& r : along) all += r.metres;
   std::ptrdiff_t cut = 0;
   for (std::ptrdiff_t i = 1; i < n; ++i) {
-    below += heights[static_cast<std::size_t>(i - 1)].value;
+    below += along[static_cast<std::size_t>(i - 1)].metres;
     if (i < kFewestOfGroup || n - i < kFewestOfGroup) continue;
     const double low = static_cast<double>(i), high = static_cast<double>(n - i);
     const double apart = (all - below) / high - below / low;
@@ -63,29 +63,30 @@ struct Groups {
 Groups groups_along(std::size_t axis, const BlockResult& result, std::span<const report::PositionResidual> residuals) {
   Groups groups;
   groups.axis = axis;
-  std::vector<Height> heights;
+  std::vector<AxisResidual> along;
   std::vector<double> sigmas;
   for (const report::PositionResidual& r : residuals) {
     // The stated sigma: two groups may be why the adjustment used a larger one.
     const double sigma = result.block.frames[r.frame].position_prior->sigma[static_cast<int>(axis)];
     if (sigma >= kUnknownHeightSigma || sigma <= 2 * kHeldPositionSigma) continue;
-    heights.push_back({-r.difference[static_cast<int>(axis)], r.frame});  // observed minus adjusted
+    along.push_back({-r.difference[static_cast<int>(axis)], r.frame});
     sigmas.push_back(sigma);
   }
-  std::stable_sort(heights.begin(), heights.end(), [](const Height& a, const Height& b) { return a.value < b.value; });
-  const std::ptrdiff_t cut = best_cut(heights);
+  std::stable_sort(along.begin(), along.end(),
+                   [](const AxisResidual& a, const AxisResidual& b) { return a.metres < b.metres; });
+  const std::ptrdiff_t cut = best_cut(along);
   if (cut == 0) return groups;
-  const std::span<const Height> all(heights);
+  const std::span<const AxisResidual> all(along);
   const auto below = all.first(static_cast<std::size_t>(cut)), above = all.subspan(static_cast<std::size_t>(cut));
   const Side low = side_of(below), high = side_of(above);
-  const double apart = high.mean - low.mean, empty = above.front().value - below.back().value;
-  const double times = kOfDeviation * (1 + kOfFew / static_cast<double>(heights.size()));
+  const double apart = high.mean - low.mean, empty = above.front().metres - below.back().metres;
+  const double times = kOfDeviation * (1 + kOfFew / static_cast<double>(along.size()));
   if (apart <= times * std::max(low.deviation, high.deviation) || apart <= kOfStated * median(std::move(sigmas)) ||
       empty < kEmpty * apart)
     return groups;
   groups.apart = apart;
-  groups.all = heights.size();
-  for (const Height& height : above) groups.upper.push_back(height.frame);
+  groups.all = along.size();
+  for (const AxisResidual& r : above) groups.upper.push_back(r.frame);
   std::sort(groups.upper.begin(), groups.upper.end());
   return groups;
 }

@@ -7,24 +7,12 @@
 #include <algorithm>
 
 #include "geometry/numbers/decompositions.h"
-#include "merge/datum/gauge.h"
+#include "merge/datum/condense_on.h"
 #include "merge/tile/condense.h"
 
 namespace megablock {
 
 namespace {
-
-UpdateMatrix condense(const TileProblem& problem, const TileState& state) {
-  PlanNode node;
-  node.leaf = 0;
-  for (const Unknown& u : tile_unknowns(problem)) {
-    (u.id.kind == UnknownKind::kCamera ? node.separator : node.eliminated).push_back(u);
-    node.owned.push_back(u);
-  }
-  const TilePlan plan = make_tile_plan(problem, node);
-  const BlockGauge gauge = make_gauge({tile_gauge(problem, plan, state)});
-  return condense_tile(problem, plan, state, 0, tile_datum(gauge, 0, problem, plan, state, DatumColumns::kNone)).update;
-}
 
 Eigen::VectorXd present_values(const TileProblem& problem, const TileState& state) {
   std::vector<double> values;
@@ -54,7 +42,7 @@ double CameraForm::at(const Eigen::VectorXd& parameters) const {
 }
 
 std::optional<CameraForm> condense_on_cameras(const TileProblem& problem, const TileState& state) {
-  const UpdateMatrix update = condense(problem, state);
+  const UpdateMatrix update = condense_on(UnknownKind::kCamera, problem, state);
   CameraForm form;
   form.minimum = present_values(problem, state);
   const auto n = static_cast<Eigen::Index>(update.diagonal.size());

@@ -15,7 +15,7 @@
 
 #include "adjust/terms/linearise.h"
 #include "geometry/numbers/decompositions.h"
-#include "merge/datum/gauge.h"
+#include "merge/datum/condense_on.h"
 #include "merge/tile/condense.h"
 
 namespace megablock {
@@ -28,19 +28,6 @@ std::int32_t mount_row(const TileProblem& problem, const UnknownId& id) {
   const MountId mount{RigIndex(id.index), id.part};
   return static_cast<std::int32_t>(std::lower_bound(problem.mounts.begin(), problem.mounts.end(), mount) -
                                    problem.mounts.begin());
-}
-
-// The normal equations condensed on the free mounts, with the priors.
-UpdateMatrix condense_on_mounts(const TileProblem& problem, const TileState& state) {
-  PlanNode node;
-  node.leaf = 0;
-  for (const Unknown& u : tile_unknowns(problem)) {
-    (u.id.kind == UnknownKind::kMount ? node.separator : node.eliminated).push_back(u);
-    node.owned.push_back(u);
-  }
-  const TilePlan plan = make_tile_plan(problem, node);
-  const BlockGauge gauge = make_gauge({tile_gauge(problem, plan, state)});
-  return condense_tile(problem, plan, state, 0, tile_datum(gauge, 0, problem, plan, state, DatumColumns::kNone)).update;
 }
 
 // The update matrix unpacked, both triangles.
@@ -104,7 +91,7 @@ Eigen::MatrixXd scale_directions(const TileProblem& problem, const TileState& st
 
 RigPosterior rig_posterior(const TileProblem& problem, const TileState& state, bool without_scale) {
   RigPosterior posterior;
-  const UpdateMatrix update = condense_on_mounts(problem, state);
+  const UpdateMatrix update = condense_on(UnknownKind::kMount, problem, state);
   const UnknownList& mounts = update.unknowns;
   if (mounts.empty()) return posterior;
   const Eigen::MatrixXd prior = prior_information(problem, state, mounts);
