@@ -13,6 +13,7 @@
 #include "cluster/stages/pipeline/cameras.h"
 #include "cluster/stages/pipeline/candidates.h"
 #include "cluster/stages/pipeline/coverage.h"
+#include "cluster/stages/pipeline/focal_lengths.h"
 #include "cluster/stages/pipeline/matching.h"
 #include "cluster/stages/pipeline/orientation.h"
 #include "cluster/stages/pipeline/tiles.h"
@@ -34,6 +35,10 @@ void features(const Stage& stage, const Job& job, JobRecord& record, StageResult
 
 void candidates(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
   results.candidates = run_candidates(stage, job, record, results.features);
+}
+
+void focal_lengths(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
+  run_focal_lengths(stage, job, record, results.features, results.candidates, results.own.block);
 }
 
 void matching(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
@@ -113,8 +118,14 @@ constexpr Stage kStages[] = {
      .kind = "candidates",
      .read_file = [](const std::string& path) { read_candidates(path); },
      .run = candidates},
+    {.name = "focal_lengths",
+     .needs = "features, candidates, where a camera leaves its parameters to the block",
+     .makes = "focal_lengths/<camera>.txt",
+     .unit = "camera",
+     .optional = true,
+     .run = focal_lengths},
     {.name = kMatchingStage,
-     .needs = "features, candidates",
+     .needs = "features, candidates, focal lengths",
      .makes = "matches/<cell>.h5",
      .unit = "cell of pairs",
      .algorithm = 12,
@@ -168,6 +179,7 @@ constexpr Stage kStages[] = {
      .needs = "tracks, orientation, where a camera chooses its parameters",
      .makes = "cameras/<rig>.txt",
      .unit = "rig",
+     .algorithm = 2,
      .command_given = "",
      .optional = true,
      .run = cameras},

@@ -34,14 +34,25 @@ class Determination {
     std::vector<CameraChoice> result;
     for (const CameraIndex camera : wanted_) {
       const auto found = std::find(row_camera_.begin(), row_camera_.end(), camera);
-      result.push_back(found == row_camera_.end() ? CameraChoice{0, "held: no image of it in the sample"}
-                                                  : chosen[static_cast<std::size_t>(found - row_camera_.begin())]);
+      if (found == row_camera_.end()) {
+        result.push_back({0, "held: no image of it in the sample"});
+        continue;
+      }
+      const auto row = static_cast<std::size_t>(found - row_camera_.begin());
+      result.push_back(chosen[row]);
+      result.back().focal_contradicted = contradicts_focal(block_.cameras[camera], whole_.state.cameras[row]);
     }
     return result;
   }
 
  private:
   bool wanted(CameraIndex camera) const { return std::binary_search(wanted_.begin(), wanted_.end(), camera); }
+
+  static bool contradicts_focal(const Camera& camera, const Intrinsics& found) {
+    constexpr double kSigmas = 3;
+    const double sigma = default_intrinsic_sigmas(camera)[kFocal];
+    return camera.focal_known && sigma > 0 && std::abs(found[kFocal] - camera.intrinsics[kFocal]) > kSigmas * sigma;
+  }
 
   // All parameters of the cameras to choose for become unknowns with a weak prior.
   void free_all() {

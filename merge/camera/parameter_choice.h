@@ -63,6 +63,8 @@ struct ChoiceCamera {
 struct CameraChoice {
   ParameterMask estimated = 0;
   std::string reason;  // "estimated: f; cx, cy; k1 (3.1 %); held: k2 (0.02 %); ..."
+  // The images contradict the known focal length by more than three sigmas of its prior, which must not pull any more.
+  bool focal_contradicted = false;
 };
 
 // The forms of all images and of those without each group, over all rows. Poses and points are at the optimum of the

@@ -11,7 +11,8 @@ from program import megablock, status
 def choice(job):
     """Number of the camera, mask and reason, without the trailer that seals the file."""
     line = (job / "cameras/000000.txt").read_bytes().split(b"\n")[0].decode()
-    camera, mask, reason = line.split(" ", 2)
+    camera, mask, contradicted, reason = line.split(" ", 3)
+    assert contradicted == "0"
     return int(camera), int(mask), reason
 
 

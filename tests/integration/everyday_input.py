@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Runs the program with blocks as people have them: what is harmless must do no harm, and what is missing is said.
 
 usage: everyday_input.py MEGABLOCK [unittest arguments]
@@ -8,6 +8,7 @@ import json
 import re
 import unittest
 
+import h5py
 import pictures
 from program import megablock, status
 from small_block import CopyOfTheBlock, setUpModule, simulate, tearDownModule, work
@@ -88,6 +89,34 @@ class EverydayInput(CopyOfTheBlock):
         self.assertGreaterEqual(state["check_points"]["compared"], 1)
         self.assertLess(state["check_points"]["normalised_error"], 3)
         self.assertLess(state["check_points"]["rms_vertical_m"], 0.2)
+
+    def focal_px(self):
+        with h5py.File(self.job / "result/block.h5") as result:
+            return result["cameras/intrinsics"][0, 0]
+
+    def test_a_focal_length_that_the_images_contradict_is_named_and_replaced(self):
+        for wrong in (262, 490, 1900):  # of 375
+            with self.subTest(focal_px=wrong):
+                self.write_project(f"cameras: {{default: {{focal_px: {wrong}}}}}\n")
+                self.run_job()
+                self.assert_all_oriented()
+                self.assertRegex(" ".join(status(self.job)["notes"]), f"the focal length of {wrong} px .* cannot be right")
+                self.assertLess(abs(self.focal_px() / 375 - 1), 0.01)
+
+    def test_a_focal_length_that_no_header_tells_comes_from_the_images(self):
+        for file in self.files():
+            pictures.strip_exif(file)
+        self.write_project("")
+        self.run_job()
+        self.assert_all_oriented()
+        self.assertRegex(" ".join(status(self.job)["notes"]), "the headers tell no focal length; the block starts with 3.. px")
+        self.assertLess(abs(self.focal_px() / 375 - 1), 0.01)
+
+    def test_a_right_focal_length_stays(self):
+        self.write_project("cameras: {default: {focal_px: 375}}\n")
+        self.run_job()
+        self.assertNotIn("focal length", " ".join(status(self.job)["notes"]))
+        self.assertLess(abs(self.focal_px() / 375 - 1), 0.01)
 
     def test_positions_without_heights_leave_the_tilt_and_end(self):
         lines = ["EPSG:4326"]

@@ -202,9 +202,9 @@ class Growth(unittest.TestCase):
                 ("coverage", "min_share", 0.9, set(), set()),
                 ("matching", "min_track_length", 3, {"tracks", "orientation", "adjustment", "merge"}, {"coverage"}),
                 ("matching", "ratio", 0.8,
-                 {"matching", "tiles", "tracks", "coverage", "orientation", "adjustment", "merge"}, set()),
+                 {"focal_lengths", "matching", "tiles", "tracks", "coverage", "orientation", "adjustment", "merge"}, set()),
                 ("candidates", "order_neighbours", 3, {"candidates"},
-                 {"matching", "tiles", "tracks", "coverage", "orientation", "adjustment", "merge"})):
+                 {"focal_lengths", "matching", "tiles", "tracks", "coverage", "orientation", "adjustment", "merge"})):
             with self.subTest(option=f"{section}.{key}"):
                 options.setdefault(section, {})[key] = value
                 write_project(self.folder, options)

@@ -1,7 +1,7 @@
 #include "cluster/stages/pipeline/cameras.h"
 
 // A unit is a rig whose cameras ask for a choice. Its file has a line for each of them: the number of the camera in the
-// block, the chosen parameters as a mask, and the reason.
+// block, the chosen parameters as a mask, 1 where the focal length is contradicted, and the reason.
 
 #include <fmt/core.h>
 
@@ -103,15 +103,22 @@ void write_choices(const std::string& path, const std::vector<CameraIndex>& came
                    const std::vector<CameraChoice>& choices) {
   std::ofstream out(path);
   for (std::size_t c = 0; c < cameras.size(); ++c)
-    out << cameras[c].value << ' ' << choices[c].estimated << ' ' << choices[c].reason << '\n';
+    out << cameras[c].value << ' ' << choices[c].estimated << ' ' << choices[c].focal_contradicted << ' '
+        << choices[c].reason << '\n';
 }
 
 void take_choices(const std::string& path, Block& block, BlockState& state) {
   std::ifstream in(path);
   std::int64_t number = 0;
   CameraChoice choice;
-  while (in >> number >> choice.estimated && std::getline(in >> std::ws, choice.reason)) {
+  while (in >> number >> choice.estimated >> choice.focal_contradicted && std::getline(in >> std::ws, choice.reason)) {
     Camera& camera = block.cameras[CameraIndex(number)];
+    if (choice.focal_contradicted) {
+      camera.focal_known = false;
+      choice.reason =
+          fmt::format("the focal length of {:.0f} px is contradicted by the images, its prior is loosened; {}",
+                      camera.intrinsics[kFocal], choice.reason);
+    }
     camera.prior_sigma = default_intrinsic_sigmas(camera, choice.estimated);
     camera.choice = choice.reason;
     Intrinsics& values = state.cameras[CameraIndex(number)];

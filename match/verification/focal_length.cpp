@@ -1,0 +1,267 @@
+#include "match/verification/focal_length.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <vector>
+
+#include "geometry/estimation/ransac.h"
+#include "geometry/numbers/median.h"
+#include "geometry/two_view/fundamental.h"
+#include "geometry/two_view/pair_estimators.h"
+#include "geometry/two_view/relative_adjustment.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr double kGridStep = 0.05;       // of the grid, in log f
+constexpr std::size_t kMostPairs = 400;  // matches of a pair that are used, evenly spaced
+constexpr double kFewestSigmaPx = 0.2;   // residuals of matches are never smaller
+constexpr double kVote = 16;             // variances at which a pair contradicts a focal length with its whole vote
+constexpr double kDissent = 0.05;        // share of the pairs that bounds the interval
+
+struct Sensor {
+  double larger_side, half_diagonal;  // pixels
+};
+
+// Steps of q, and its range in steps: from cushions to barrels.
+constexpr double kBendStep = 0.05;
+constexpr int kFewestBends = -3, kMostBends = 10;
+
+PointPairs scaled(const PointPairs& points, double factor) {
+  PointPairs result = points;
+  for (auto* side : {&result.a, &result.b})
+    for (Eigen::Vector2d& p : *side) p *= factor;
+  return result;
+}
+
+// Divides by the larger side, and straightens by q.
+PointPairs straightened(const PointPairs& pixels, double q, const Sensor& sensor) {
+  PointPairs result = pixels;
+  for (auto* side : {&result.a, &result.b})
+    for (Eigen::Vector2d& p : *side)
+      p *= (1 + q * p.squaredNorm() / (sensor.half_diagonal * sensor.half_diagonal)) / sensor.larger_side;
+  return result;
+}
+
+std::optional<RansacResult<Eigen::Matrix3d>> find_fundamental(const PointPairs& points, double larger_side,
+                                                              std::uint64_t seed, const FocalLengthOptions& options) {
+  if (points.size() < static_cast<std::size_t>(options.min_inliers)) return std::nullopt;
+  RansacOptions sampling;
+  sampling.threshold = options.max_residual_px / larger_side;
+  sampling.confidence = 0.999;
+  sampling.max_draws = 3000;
+  sampling.seed = seed;
+  auto found = ransac(FundamentalEstimator(points), sampling);
+  if (found && found->consensus.count < options.min_inliers) found.reset();
+  return found;
+}
+
+// The inliers of a fundamental matrix, at most kMostPairs of them, with the sigma of their residuals; all in larger
+// sides of the image.
+struct Inliers {
+  PointPairs points;
+  Eigen::Matrix3d fundamental;
+  double sigma = 0;
+};
+
+std::optional<Inliers> inliers_of_fundamental(const PointPairs& points, double larger_side, std::uint64_t seed,
+                                              const FocalLengthOptions& options) {
+  const auto found = find_fundamental(points, larger_side, seed, options);
+  if (!found) return std::nullopt;
+  Inliers inliers{{}, found->model};
+  const auto count = static_cast<std::size_t>(found->consensus.count);
+  const std::size_t used = std::min(count, kMostPairs);
+  std::vector<double> squares;
+  for (std::size_t i = 0, inlier = 0; i < points.size(); ++i) {
+    if (!found->consensus.inlier[i]) continue;
+    squares.push_back(squared_sampson(found->model, points.a[i], points.b[i]));
+    // Number k of `count` is taken where k used / count passes an integer.
+    if (inlier * used / count != (inlier + 1) * used / count) {
+      inliers.points.a.push_back(points.a[i]);
+      inliers.points.b.push_back(points.b[i]);
+    }
+    ++inlier;
+  }
+  inliers.sigma = std::max(1.4826 * std::sqrt(median(std::move(squares))), kFewestSigmaPx / larger_side);
+  return inliers;
+}
+
+// c(f) of the head of the header.
+class PairCost {
+ public:
+  explicit PairCost(const Inliers& inliers) : inliers_(inliers), scale_(3 * inliers.sigma) {}
+
+  struct Point {
+    double cost = std::numeric_limits<double>::infinity();
+    RelativeOrientation orientation;
+  };
+
+  // With the essential matrix nearest to F as a start. Its four orientations have the same residuals.
+  Point from_fundamental(double focal) const {
+    const Eigen::Vector3d k(focal, focal, 1);
+    const auto starts =
+        orientations_of_essential(nearest_essential(k.asDiagonal() * inliers_.fundamental * k.asDiagonal()));
+    return starts.empty() ? Point{} : from(focal, *starts.begin());
+  }
+
+  Point from(double focal, const RelativeOrientation& start) const {
+    const PointPairs points = scaled(inliers_.points, 1 / focal);
+    RelativeAdjustment by;
+    by.scale = scale_ / focal;
+    by.tolerance = 1e-6;
+    Point point{0, adjust_orientation(start, points, by)};
+    const Eigen::Matrix3d essential = essential_from(point.orientation);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double u2 = squared_sampson(essential, points.a[i], points.b[i]) / (by.scale * by.scale);
+      point.cost += std::isfinite(u2) ? u2 / (1 + u2) : 1;
+    }
+    return point;
+  }
+
+ private:
+  const Inliers& inliers_;
+  double scale_;
+};
+
+// c at the points of the grid: the best of three starts, which are F and both neighbours.
+std::vector<double> costs_on_grid(const Inliers& inliers, const std::vector<double>& focals) {
+  const PairCost cost(inliers);
+  std::vector<PairCost::Point> points;
+  for (const double focal : focals) points.push_back(cost.from_fundamental(focal));
+  const auto improve = [&](std::size_t k, std::size_t neighbour) {
+    if (!std::isfinite(points[neighbour].cost)) return;
+    PairCost::Point other = cost.from(focals[k], points[neighbour].orientation);
+    if (other.cost < points[k].cost) points[k] = other;
+  };
+  for (std::size_t k = 1; k < points.size(); ++k) improve(k, k - 1);
+  for (std::size_t k = points.size() - 1; k-- > 0;) improve(k, k + 1);
+  std::vector<double> costs;
+  for (const PairCost::Point& point : points) costs.push_back(point.cost);
+  return costs;
+}
+
+// Place of the vertex of the parabola through three points of the grid, in steps from the middle one.
+double vertex(double before, double middle, double after) {
+  const double curvature = before - 2 * middle + after;
+  return curvature > 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0;
+}
+
+// v at the points of the grid.
+std::vector<double> votes_of(const Inliers& inliers, const std::vector<double>& focals) {
+  std::vector<double> votes = costs_on_grid(inliers, focals);
+  const double lowest = *std::min_element(votes.begin(), votes.end());
+  // u is 1 / 9, as the costs are in squares of three sigmas. It is more where no essential matrix fits as well as F.
+  const double redundancy = std::max(1.0, static_cast<double>(inliers.points.size()) - 6);
+  const double variance = std::max(1.0 / 9, lowest / redundancy);
+  for (double& vote : votes) vote = std::min(1.0, (vote - lowest) / (kVote * variance));
+  return votes;
+}
+
+// Fills in the focal length and its interval from the votes.
+void find_least_contradicted(FocalLength& found) {
+  const std::vector<double>& votes = found.votes;
+  const auto lowest = std::min_element(votes.begin(), votes.end());
+  const auto last = std::ssize(votes) - 1, k = lowest - votes.begin();
+  const auto at = [&](std::ptrdiff_t i) { return votes[static_cast<std::size_t>(i)]; };
+  const auto focal_at = [&](double place) { return found.grid_px.front() * std::exp(kGridStep * place); };
+  const double level = *lowest + std::max(1.0, kDissent * found.asked);
+  std::ptrdiff_t first = k, end = k;
+  while (first > 0 && at(first - 1) <= level) --first;
+  while (end < last && at(end + 1) <= level) ++end;
+  found.open = first == 0 || end == last;
+  // The ends lie between a point of the grid below the level and the next one above it.
+  const double from = first == 0 ? 0 : (level - at(first)) / (at(first - 1) - at(first)),
+               to = end == last ? 0 : (level - at(end)) / (at(end + 1) - at(end));
+  found.from_px = focal_at(static_cast<double>(first) - from);
+  found.to_px = focal_at(static_cast<double>(end) + to);
+  found.focal_px = focal_at(static_cast<double>(k) + (k > 0 && k < last ? vertex(at(k - 1), at(k), at(k + 1)) : 0));
+}
+
+// The first pairs that have a fundamental matrix.
+std::vector<const MatchedImages*> usable_pairs(std::span<const MatchedImages> pairs, const Sensor& sensor,
+                                               const FocalLengthOptions& options) {
+  std::vector<std::uint8_t> usable(pairs.size());
+#pragma omp parallel for schedule(dynamic, 1) num_threads(options.threads)
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    usable[i] = find_fundamental(straightened(pairs[i].pixels, 0, sensor), sensor.larger_side, pairs[i].seed, options)
+                    .has_value();
+  std::vector<const MatchedImages*> result;
+  for (std::size_t i = 0; i < pairs.size() && std::ssize(result) < options.max_pairs; ++i)
+    if (usable[i]) result.push_back(&pairs[i]);
+  return result;
+}
+
+// The support that the fundamental matrices of all pairs have with q.
+double support_with(double q, const std::vector<const MatchedImages*>& pairs, const Sensor& sensor,
+                    const FocalLengthOptions& options) {
+  std::vector<double> support(pairs.size());
+#pragma omp parallel for schedule(dynamic, 1) num_threads(options.threads)
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const PointPairs points = straightened(pairs[i]->pixels, q, sensor);
+    const auto found = find_fundamental(points, sensor.larger_side, pairs[i]->seed, options);
+    support[i] = found ? found->consensus.score : 0;
+  }
+  return std::accumulate(support.begin(), support.end(), 0.0);
+}
+
+// q with the largest support. It climbs from zero in equal steps; the support has one peak.
+double find_bend(const std::vector<const MatchedImages*>& pairs, const Sensor& sensor,
+                 const FocalLengthOptions& options) {
+  std::map<int, double> known;  // by number of steps
+  const auto support = [&](int steps) {
+    const auto [place, is_new] = known.try_emplace(steps);
+    if (is_new) place->second = support_with(kBendStep * steps, pairs, sensor, options);
+    return place->second;
+  };
+  int top = 0;
+  for (const int direction : {1, -1})
+    while (top + direction >= kFewestBends && top + direction <= kMostBends && support(top + direction) > support(top))
+      top += direction;
+  const double shift = vertex(-support(top - 1), -support(top), -support(top + 1));
+  return kBendStep * (top + shift);
+}
+
+}  // namespace
+
+std::optional<FocalLength> focal_length_of(std::span<const MatchedImages> pairs, int width, int height,
+                                           const FocalLengthOptions& options) {
+  const Sensor sensor{static_cast<double>(std::max(width, height)), 0.5 * std::hypot(width, height)};
+  const std::vector<const MatchedImages*> usable = usable_pairs(pairs, sensor, options);
+  if (std::ssize(usable) < options.min_pairs) return std::nullopt;
+  const double q = find_bend(usable, sensor, options);
+  FocalLength found;
+  found.straighten = q;
+  found.asked = static_cast<int>(usable.size());
+  std::vector<double> focals;  // in larger sides
+  for (double focal = options.min_ratio; focal <= options.max_ratio; focal *= std::exp(kGridStep))
+    focals.push_back(focal);
+  std::vector<std::vector<double>> of_pairs(usable.size());
+#pragma omp parallel for schedule(dynamic, 1) num_threads(options.threads)
+  for (std::size_t i = 0; i < usable.size(); ++i)
+    if (const auto inliers = inliers_of_fundamental(straightened(usable[i]->pixels, q, sensor), sensor.larger_side,
+                                                    usable[i]->seed, options))
+      of_pairs[i] = votes_of(*inliers, focals);
+  found.votes.assign(focals.size(), 0);
+  for (const double focal : focals) found.grid_px.push_back(focal * sensor.larger_side);
+  for (const std::vector<double>& votes : of_pairs)
+    for (std::size_t k = 0; k < votes.size(); ++k) found.votes[k] += votes[k];
+  find_least_contradicted(found);
+  return found;
+}
+
+// The grid hides what is finer than itself.
+double FocalLength::sigma() const { return std::max(0.25 * kGridStep, 0.25 * std::log(to_px / from_px)); }
+
+double FocalLength::against(double focal) const {
+  const double place =
+      std::clamp(std::log(focal / grid_px.front()) / kGridStep, 0.0, static_cast<double>(votes.size() - 1));
+  const auto below = static_cast<std::size_t>(place), above = std::min(below + 1, votes.size() - 1);
+  const double share = place - static_cast<double>(below);
+  return std::lerp(votes[below], votes[above], share) - *std::min_element(votes.begin(), votes.end());
+}
+
+}  // namespace megablock
