@@ -121,6 +121,7 @@ void describe(OptionVisitor& visit, MergeSettings& o) {
   visit.flag("estimate_sigmas", o.estimate_sigmas);
   visit.flag("scale_contradicted_sigmas", o.scale_contradicted_sigmas);
   visit.flag("scale_sigma", o.scale_sigma);
+  visit.flag("empirical_sigmas", o.empirical_sigmas);
 }
 
 // The section that sets these members.

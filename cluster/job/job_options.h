@@ -35,7 +35,9 @@ struct MergeSettings {
   // (adjust/tile/prior_scales.h).
   bool scale_contradicted_sigmas = true;
   bool scale_sigma = false;  // posterior sigmas multiplied by the a-posteriori sigma
-  void check() const;        // throws InputError
+  // Also computes the empirical sigmas (merge/tile/cluster_scores.h), in one further sweep up and down.
+  bool empirical_sigmas = true;
+  void check() const;  // throws InputError
 };
 
 struct JobOptions {

@@ -102,7 +102,7 @@ bool is_free(const BlockResult& result) {
 // The similarity that stands for a free datum, and the covariances of the matched frames after it.
 struct Aligned {
   Similarity similarity;
-  DatumCovariances covariances;
+  DatumCovariances covariances, empirical;
 };
 
 std::vector<FrameIndex> frames_of(const std::vector<Match>& matches) {
@@ -112,7 +112,8 @@ std::vector<FrameIndex> frames_of(const std::vector<Match>& matches) {
 }
 
 Aligned as_it_is(const BlockResult& result, const std::vector<Match>& matches) {
-  return {Similarity(), stated_covariances(result, frames_of(matches))};
+  const std::vector<FrameIndex> frames = frames_of(matches);
+  return {Similarity(), stated_covariances(result, frames), stated_covariances(result, frames, SigmaKind::kEmpirical)};
 }
 
 Aligned align(const BlockResult& result, const std::vector<Match>& matches) {
@@ -128,7 +129,8 @@ Aligned align(const BlockResult& result, const std::vector<Match>& matches) {
     throw InputError(
         "the datum of the result is free, and fewer than three of its frames at different places have a true pose; "
         "give a truth with at least three");
-  return {*similarity, covariances_after_fit(result, frames, fit)};
+  return {*similarity, covariances_after_fit(result, frames, fit),
+          covariances_after_fit(result, frames, fit, SigmaKind::kEmpirical)};
 }
 
 // The truth in the ground frame of the result, if both frames are known; otherwise the truth as it is.
@@ -158,7 +160,7 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
   const Eigen::Matrix3d truth_position = std::pow(options.truth_position_sigma_m, 2) * Eigen::Matrix3d::Identity(),
                         truth_rotation = truth_angle * truth_angle * Eigen::Matrix3d::Identity();
   RootMeanSquare position, rotation, relative;
-  NormalisedError normalised_position, normalised_rotation;
+  NormalisedError normalised_position, normalised_rotation, empirical_position, empirical_rotation;
   std::array<NormalisedError, 2> position_by_place, rotation_by_place;  // interior, boundary
   double largest = 0;
   const bool positions_used = option_of(result, "adjustment.use_position_priors") != "false",
@@ -193,15 +195,18 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
     };
     const BlockResult::Matrix6 covariance = variance_factor * aligned.covariances.frames[i];
     const Eigen::Matrix3d rotation_covariance = of_rotation(covariance), position_covariance = of_position(covariance);
+    const bool empirical = !aligned.empirical.frames.empty();
     const Frame& frame = frames[m.frame];
     const bool by_place = !result.boundary.empty();
     const std::size_t place = by_place && result.boundary[m.frame] != 0;
     if (!(attitudes_used && frame.attitude_prior && held(*frame.attitude_prior))) {
       normalised_rotation.add(angle, rotation_covariance);
+      if (empirical) empirical_rotation.add(angle, of_rotation(aligned.empirical.frames[i]));
       if (by_place) rotation_by_place[place].add(angle, rotation_covariance);
     }
     if (!(positions_used && frame.position_prior && held(*frame.position_prior))) {
       normalised_position.add(error, position_covariance);
+      if (empirical) empirical_position.add(error, of_position(aligned.empirical.frames[i]));
       if (by_place) position_by_place[place].add(error, position_covariance);
     }
   }
@@ -214,6 +219,8 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
   evaluation.relative_position_rms_m = relative.value();
   evaluation.normalised_error_position = normalised_position.value();
   evaluation.normalised_error_rotation = normalised_rotation.value();
+  evaluation.empirical_error_position = empirical_position.value();
+  evaluation.empirical_error_rotation = empirical_rotation.value();
   evaluation.normalised_error_position_interior = position_by_place[0].value();
   evaluation.normalised_error_rotation_interior = rotation_by_place[0].value();
   evaluation.normalised_error_position_boundary = position_by_place[1].value();
@@ -222,7 +229,7 @@ void evaluate_frames(const BlockResult& result, const std::vector<Match>& matche
 
 void evaluate_control(const BlockResult& result, double variance_factor, Evaluation& evaluation) {
   RootMeanSquare control, check, horizontal, vertical;
-  NormalisedError normalised;
+  NormalisedError normalised, empirical;
   for (std::size_t i = 0; i < result.control.size(); ++i) {
     const ControlPoint& point = result.block.control_points[i];
     const BlockResult::ControlResult& found = result.control[i];
@@ -237,6 +244,7 @@ void evaluate_control(const BlockResult& result, double variance_factor, Evaluat
     // difference is no error, and it has no normalised one here.
     const Eigen::Matrix3d stated = used_sigma(result, point).cwiseAbs2().asDiagonal();
     normalised.add(error, variance_factor * found.covariance + stated);
+    if (i < result.empirical.control.size()) empirical.add(error, result.empirical.control[i] + stated);
   }
   evaluation.check_points = check.count();
   evaluation.control_points = control.count();
@@ -245,6 +253,7 @@ void evaluate_control(const BlockResult& result, double variance_factor, Evaluat
   evaluation.check_rms_vertical_m = vertical.value();
   evaluation.control_rms_m = control.value();
   evaluation.normalised_error_check = normalised.value();
+  evaluation.empirical_error_check = empirical.value();
 }
 
 }  // namespace
@@ -308,7 +317,12 @@ std::string to_text(const Evaluation& e) {
   add(e.with_sigmas, "rotation", e.normalised_error_rotation);
   add(std::isfinite(e.normalised_error_check), "check points", e.normalised_error_check);
   if (!ratios.empty())
-    text += "\nerror / stated sigma        " + ratios + " (1: the sigmas are true" + (some_held ? "; -: held)" : ")");
+    text += "\nerror / formal sigma        " + ratios + " (1: the sigmas are true" + (some_held ? "; -: held)" : ")");
+  ratios.clear();
+  add(std::isfinite(e.empirical_error_position), "position", e.empirical_error_position);
+  add(std::isfinite(e.empirical_error_rotation), "rotation", e.empirical_error_rotation);
+  add(std::isfinite(e.empirical_error_check), "check points", e.empirical_error_check);
+  if (!ratios.empty()) text += "\nerror / empirical sigma     " + ratios;
   if (!e.sigma_note.empty()) text += "\n" + e.sigma_note;
   return text;
 }
@@ -324,6 +338,8 @@ std::string to_json(const Evaluation& e) {
   json["relative_position_rms_m"] = e.relative_position_rms_m;
   json["normalised_error_position"] = e.normalised_error_position;
   json["normalised_error_rotation"] = e.normalised_error_rotation;
+  json["empirical_error_position"] = e.empirical_error_position;
+  json["empirical_error_rotation"] = e.empirical_error_rotation;
   json["normalised_error_position_interior"] = e.normalised_error_position_interior;
   json["normalised_error_rotation_interior"] = e.normalised_error_rotation_interior;
   json["normalised_error_position_boundary"] = e.normalised_error_position_boundary;
@@ -334,6 +350,7 @@ std::string to_json(const Evaluation& e) {
   json["check_rms_horizontal_m"] = e.check_rms_horizontal_m;
   json["check_rms_vertical_m"] = e.check_rms_vertical_m;
   json["normalised_error_check"] = e.normalised_error_check;
+  json["empirical_error_check"] = e.empirical_error_check;
   json["control_points"] = e.control_points;
   json["control_rms_m"] = e.control_rms_m;
   return json.dump(2);

@@ -51,10 +51,12 @@ struct Evaluation {
   double normalised_error_position = kNone, normalised_error_rotation = kNone;
   double normalised_error_position_interior = kNone, normalised_error_rotation_interior = kNone;
   double normalised_error_position_boundary = kNone, normalised_error_rotation_boundary = kNone;
+  // The same with the empirical sigmas (docs/reference/methods.md, "Sigmas").
+  double empirical_error_position = kNone, empirical_error_rotation = kNone;
   std::int64_t check_points = 0, control_points = 0;  // number of those with an adjusted position
   double check_rms_m = kNone, check_rms_horizontal_m = kNone, check_rms_vertical_m = kNone;
   double control_rms_m = kNone;
-  double normalised_error_check = kNone;
+  double normalised_error_check = kNone, empirical_error_check = kNone;
 };
 
 // Frames are matched by name (that of the frame, else that of its first image). A truth with another origin is

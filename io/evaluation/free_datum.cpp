@@ -135,23 +135,25 @@ Eigen::MatrixXd after_fit(const Eigen::MatrixXd& covariance, std::span<const Pos
   return s * covariance * s.transpose();
 }
 
-DatumCovariances stated_covariances(const BlockResult& result, std::span<const FrameIndex> frames) {
+DatumCovariances stated_covariances(const BlockResult& result, std::span<const FrameIndex> frames, SigmaKind kind) {
+  const auto& all = kind == SigmaKind::kFormal ? result.frame_covariance : result.empirical.frame_covariance;
   DatumCovariances covariances;
-  if (!result.frame_covariance.empty())
-    for (const FrameIndex frame : frames) covariances.frames.push_back(result.frame_covariance[frame]);
+  for (std::size_t i = 0; i < frames.size() && !all.empty(); ++i) covariances.frames.push_back(all[frames[i]]);
   return covariances;
 }
 
-DatumCovariances covariances_after_fit(const BlockResult& result, std::span<const FrameIndex> frames, DatumFit fit) {
-  const auto& all_aligned = result.aligned_covariance;
-  DatumCovariances found = stated_covariances(result, frames);
+DatumCovariances covariances_after_fit(const BlockResult& result, std::span<const FrameIndex> frames, DatumFit fit,
+                                       SigmaKind kind) {
+  const bool formal = kind == SigmaKind::kFormal;
+  const auto& all_aligned = formal ? result.aligned_covariance : result.empirical.aligned_covariance;
+  DatumCovariances found = stated_covariances(result, frames, kind);
   if (found.frames.empty()) return found;
   if (result.free_parts.size() > 1)
     return {{},
             "no ratios: the block has " + std::to_string(result.free_parts.size()) +
                 " free parts, and one similarity does not fit them"};
   // From the covariances of all poses together.
-  const BlockResult::JointCovariance& joint = result.joint_covariance;
+  const BlockResult::JointCovariance& joint = formal ? result.joint_covariance : result.empirical.joint_covariance;
   std::vector<Eigen::Index> rows;
   std::vector<Pose> poses;
   for (const FrameIndex frame : frames) {

@@ -37,8 +37,11 @@ struct DatumCovariances {
   std::vector<BlockResult::Matrix6> frames;  // empty: there are none
   std::string note;  // why there are none, or in which datum they are instead; empty: all is well
 };
-DatumCovariances covariances_after_fit(const BlockResult& result, std::span<const FrameIndex> frames, DatumFit fit);
+enum class SigmaKind { kFormal, kEmpirical };
+DatumCovariances covariances_after_fit(const BlockResult& result, std::span<const FrameIndex> frames, DatumFit fit,
+                                       SigmaKind kind = SigmaKind::kFormal);
 // The covariances of these frames as they stand in the result; empty: there are none.
-DatumCovariances stated_covariances(const BlockResult& result, std::span<const FrameIndex> frames);
+DatumCovariances stated_covariances(const BlockResult& result, std::span<const FrameIndex> frames,
+                                    SigmaKind kind = SigmaKind::kFormal);
 
 }  // namespace megablock

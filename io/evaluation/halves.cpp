@@ -11,6 +11,7 @@
 #include "geometry/camera/models/models.h"
 #include "io/base/error.h"
 #include "io/evaluation/free_datum.h"
+#include "io/text/counted.h"
 
 namespace megablock {
 
@@ -38,42 +39,46 @@ class Ratio {
 
 class Differences {
  public:
-  void add(const Eigen::VectorXd& difference, const Eigen::MatrixXd& formal) {
+  // `empirical` is empty where it is not known.
+  void add(const Eigen::VectorXd& difference, const Eigen::MatrixXd& formal, const Eigen::MatrixXd& empirical) {
     squares_ += difference.squaredNorm();
     ++count_;
     formal_.add(difference, formal);
+    if (empirical.size() > 0) empirical_.add(difference, empirical);
   }
   HalfDifferences result(double unit = 1) const {
     if (count_ == 0) return {};
-    return {count_, unit * std::sqrt(squares_ / static_cast<double>(count_)), formal_.value()};
+    return {count_, unit * std::sqrt(squares_ / static_cast<double>(count_)), formal_.value(), empirical_.value()};
   }
 
  private:
   double squares_ = 0;
   std::int64_t count_ = 0;
-  Ratio formal_;
+  Ratio formal_, empirical_;
 };
 
 // The covariances of the differences of the common frames, in the ground frame of the first result.
 struct CommonFrames {
   std::vector<FrameIndex> frames;
   Similarity similarity;  // from the second result to the first one
-  std::vector<BlockResult::Matrix6> formal;
+  std::vector<BlockResult::Matrix6> formal, empirical;
   std::string note;
 };
 
 // Collects the sums of the covariances of both results.
-void add_covariances(const BlockResult& first, const BlockResult& second, bool aligned, CommonFrames& common) {
+void add_covariances(const BlockResult& first, const BlockResult& second, bool aligned, SigmaKind kind,
+                     CommonFrames& common) {
   const auto of = [&](const BlockResult& result) {
-    return aligned ? covariances_after_fit(result, common.frames, DatumFit::kPoses)
-                   : stated_covariances(result, common.frames);
+    return aligned ? covariances_after_fit(result, common.frames, DatumFit::kPoses, kind)
+                   : stated_covariances(result, common.frames, kind);
   };
   const DatumCovariances one = of(first), other = of(second);
   BlockResult::Matrix6 turn = BlockResult::Matrix6::Zero();
   turn.topLeftCorner<3, 3>() = common.similarity.rotation.toRotationMatrix();
   turn.bottomRightCorner<3, 3>() = common.similarity.scale * turn.topLeftCorner<3, 3>();
+  auto& sums = kind == SigmaKind::kFormal ? common.formal : common.empirical;
   for (std::size_t i = 0; i < one.frames.size() && i < other.frames.size(); ++i)
-    common.formal.emplace_back(one.frames[i] + turn * other.frames[i] * turn.transpose());
+    sums.emplace_back(one.frames[i] + turn * other.frames[i] * turn.transpose());
   if (common.note.empty()) common.note = one.note.empty() ? other.note : one.note;
 }
 
@@ -94,8 +99,16 @@ CommonFrames common_frames(const BlockResult& first, const BlockResult& second, 
     if (!similarity) throw InputError("the two halves cannot be compared: all images are at one place");
     common.similarity = *similarity;
   }
-  add_covariances(first, second, aligned, common);
+  add_covariances(first, second, aligned, SigmaKind::kFormal, common);
+  add_covariances(first, second, aligned, SigmaKind::kEmpirical, common);
   return common;
+}
+
+// The sum of two matrices, or an empty one where one of them is missing.
+template <typename Matrices>
+Eigen::MatrixXd sum_at(const Matrices& first, const Matrices& second, std::int64_t row) {
+  if (row >= std::ssize(first) || row >= std::ssize(second)) return {};
+  return first.begin()[row] + second.begin()[row];
 }
 
 void compare_poses(const BlockResult& first, const BlockResult& second, const CommonFrames& common,
@@ -104,9 +117,13 @@ void compare_poses(const BlockResult& first, const BlockResult& second, const Co
   for (std::size_t i = 0; i < common.formal.size(); ++i) {
     const Pose& one = first.state.frames[common.frames[i]];
     const Pose other = common.similarity(second.state.frames[common.frames[i]]);
-    positions.add(other.centre - one.centre, common.formal[i].bottomRightCorner<3, 3>());
+    const bool known = i < common.empirical.size();
+    const auto part = [&](Eigen::Index row) -> Eigen::MatrixXd {
+      return known ? Eigen::MatrixXd(common.empirical[i].block<3, 3>(row, row)) : Eigen::MatrixXd();
+    };
+    positions.add(other.centre - one.centre, common.formal[i].bottomRightCorner<3, 3>(), part(3));
     rotations.add(rotation_log<double>(one.rotation.conjugate() * other.rotation),
-                  common.formal[i].topLeftCorner<3, 3>());
+                  common.formal[i].topLeftCorner<3, 3>(), part(0));
   }
   of_positions = positions.result();
   of_rotations = rotations.result(180 / std::numbers::pi);
@@ -123,6 +140,8 @@ std::vector<CameraDifference> compare_cameras(const BlockResult& first, const Bl
   if (first.camera_covariance.empty() || second.camera_covariance.empty()) return cameras;
   for (CameraIndex c(0); first.block.cameras.contains(c); ++c.value) {
     const Eigen::MatrixXd formal = first.camera_covariance[c] + second.camera_covariance[c];
+    const Eigen::MatrixXd empirical =
+        sum_at(first.empirical.camera_covariance, second.empirical.camera_covariance, c.value);
     std::vector<Eigen::Index> free;
     for (Eigen::Index k = 0; k < formal.rows(); ++k)
       if (first.camera_covariance[c](k, k) > 0 && second.camera_covariance[c](k, k) > 0) free.push_back(k);
@@ -134,10 +153,11 @@ std::vector<CameraDifference> compare_cameras(const BlockResult& first, const Bl
     for (std::size_t i = 0; i < free.size(); ++i) {
       const int k = static_cast<int>(free[i]);
       const double d = difference[static_cast<Eigen::Index>(i)] = other[k] - one[k];
-      camera.each.push_back({parameter_name(one.model(), k), d, d / std::sqrt(formal(k, k))});
+      camera.each.push_back({parameter_name(one.model(), k), d, d / std::sqrt(formal(k, k)),
+                             empirical.size() > 0 ? d / std::sqrt(empirical(k, k)) : kNone});
     }
     Differences all;
-    all.add(difference, formal(free, free));
+    all.add(difference, formal(free, free), empirical.size() > 0 ? empirical(free, free).eval() : empirical);
     camera.parameters = all.result();
     camera.parameters.count = std::ssize(free);
     cameras.push_back(std::move(camera));
@@ -161,7 +181,8 @@ HalvesComparison compare_halves(const BlockResult& first, const BlockResult& sec
   for (std::size_t p = 0; !halves.aligned && p < first.control.size() && p < second.control.size(); ++p)
     if (first.control[p].takes_part() && second.control[p].takes_part())
       points.add(second.control[p].adjusted - first.control[p].adjusted,
-                 first.control[p].covariance + second.control[p].covariance);
+                 first.control[p].covariance + second.control[p].covariance,
+                 sum_at(first.empirical.control, second.empirical.control, static_cast<std::int64_t>(p)));
   halves.points = points.result();
   halves.cameras = compare_cameras(first, second);
   return halves;
@@ -184,7 +205,7 @@ double root_mean_square(const std::vector<Item>& items, double Item::*member) {
 
 HalfDifferences mean_of(const std::vector<HalfDifferences>& all) {
   HalfDifferences mean = all.front();
-  for (double HalfDifferences::*member : {&HalfDifferences::rms, &HalfDifferences::formal})
+  for (double HalfDifferences::*member : {&HalfDifferences::rms, &HalfDifferences::formal, &HalfDifferences::empirical})
     mean.*member = root_mean_square(all, member);
   for (const HalfDifferences& d : all) mean.count = std::min(mean.count, d.count);
   return mean;
@@ -208,7 +229,7 @@ std::vector<CameraDifference> mean_of_cameras(OfDivisions divisions) {
     CameraDifference mean{first.camera, mean_of(parameters), first.each};
     using Parameter = CameraDifference::Parameter;
     for (std::size_t k = 0; k < each.size(); ++k)
-      for (double Parameter::*member : {&Parameter::difference, &Parameter::formal})
+      for (double Parameter::*member : {&Parameter::difference, &Parameter::formal, &Parameter::empirical})
         mean.each[k].*member = root_mean_square(each[k], member);
     cameras.push_back(std::move(mean));
   }
@@ -238,7 +259,12 @@ HalvesComparison mean_of(const std::vector<HalvesComparison>& divisions) {
 
 namespace {
 
-std::string ratios_of(const HalfDifferences& d) { return fmt::format("over sigma: {:.3f}", d.formal); }
+// " over sigma: formal 1.204, empirical 1.011"
+std::string ratios_of(const HalfDifferences& d) {
+  std::string text = fmt::format("over sigma: formal {:.3f}", d.formal);
+  if (std::isfinite(d.empirical)) text += fmt::format(", empirical {:.3f}", d.empirical);
+  return text;
+}
 
 std::string line_of(const char* what, const HalfDifferences& d, const char* unit, int digits) {
   if (d.count == 0) return "";
@@ -250,7 +276,8 @@ std::string lines_of(const std::vector<CameraDifference>& cameras) {
   for (const CameraDifference& camera : cameras) {
     text += fmt::format("\n{:<27} {}", "camera " + camera.camera, ratios_of(camera.parameters));
     for (const CameraDifference::Parameter& p : camera.each)
-      text += fmt::format("\n  {:<26}{:.4g}; over sigma: {:.2f}", p.name, p.difference, p.formal);
+      text += fmt::format("\n  {:<26}{:.4g}; over sigma: formal {:.2f}", p.name, p.difference, p.formal) +
+              (std::isfinite(p.empirical) ? fmt::format(", empirical {:.2f}", p.empirical) : "");
   }
   return text;
 }
@@ -260,6 +287,7 @@ nlohmann::ordered_json json_of(const HalfDifferences& d, const char* unit) {
   json["count"] = d.count;
   json[std::string("rms_") + unit] = d.rms;
   json["over_formal_sigma"] = d.formal;
+  json["over_empirical_sigma"] = d.empirical;
   return json;
 }
 
@@ -269,8 +297,10 @@ nlohmann::ordered_json json_of(const std::vector<CameraDifference>& cameras) {
     nlohmann::ordered_json json;
     json["camera"] = camera.camera;
     json["over_formal_sigma"] = camera.parameters.formal;
+    json["over_empirical_sigma"] = camera.parameters.empirical;
     for (const CameraDifference::Parameter& p : camera.each)
-      json["parameters"][p.name] = {{"difference", p.difference}, {"over_formal_sigma", p.formal}};
+      json["parameters"][p.name] = {
+          {"difference", p.difference}, {"over_formal_sigma", p.formal}, {"over_empirical_sigma", p.empirical}};
     list.push_back(std::move(json));
   }
   return list;
@@ -289,7 +319,9 @@ std::string to_text(const HalvesComparison& h) {
   if (!h.cameras_of_images.empty())
     text += "\ndifferences of two adjustments, each with half of the images" + lines_of(h.cameras_of_images);
   text += "\n1: the sigmas hold. Errors that both halves share, such as those of the lens model, are not seen.";
-  if (h.missing > 0) text += fmt::format("\n{} images are oriented in one half alone", h.missing);
+  if (h.missing > 0)
+    text +=
+        fmt::format("\n{} {} oriented in one half alone", counted(h.missing, "image"), h.missing == 1 ? "is" : "are");
   if (!h.note.empty()) text += "\n" + h.note;
   return text;
 }

@@ -19,11 +19,13 @@
 
 namespace megablock {
 
-// Differences of one kind of unknowns: their number, root mean square and ratio to their sigmas. NaN: none.
+// Differences of one kind of unknowns: their number, root mean square and ratios to their formal and empirical sigmas.
+// NaN: none.
 struct HalfDifferences {
   std::int64_t count = 0;
   double rms = std::numeric_limits<double>::quiet_NaN();
   double formal = std::numeric_limits<double>::quiet_NaN();
+  double empirical = std::numeric_limits<double>::quiet_NaN();
 };
 
 struct CameraDifference {
@@ -31,8 +33,8 @@ struct CameraDifference {
   HalfDifferences parameters;  // without rms: the units of the parameters differ
   struct Parameter {
     std::string name;
-    double difference = 0;  // in the unit of the parameter
-    double formal = 0;      // over its sigma, with sign
+    double difference = 0;             // in the unit of the parameter
+    double formal = 0, empirical = 0;  // over its sigmas, with sign; NaN: there is none
   };
   std::vector<Parameter> each;
 };

@@ -126,6 +126,16 @@ struct BlockResult : TrackResults {
   };
   std::vector<ControlResult> control;  // in block order
 
+  // The empirical covariances of the same unknowns, which residuals show (docs/reference/methods.md, "Sigmas"); those
+  // above are the formal ones. Never multiplied by the variance factor. Empty if they were not computed.
+  struct Empirical {
+    IndexedVector<FrameIndex, Matrix6> frame_covariance, aligned_covariance;
+    JointCovariance joint_covariance;
+    IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;
+    IndexedVector<RigIndex, std::vector<Matrix6>> mount_covariance;
+    std::vector<Eigen::Matrix3d> control;  // [control]
+  } empirical;
+
   // Figures, which `status --json` prints.
   // chi2 = sum of squared weighted residuals, with the weights of the robust loss; variance_factor = chi2 /
   // degrees_of_freedom, the square of sigma naught.

@@ -40,13 +40,17 @@ void check_sizes(const BlockResult& result) {
 
 std::int64_t rows(const auto& items) { return static_cast<std::int64_t>(items.size()); }
 
-void put_control_results(Hdf5Writer& file, const std::vector<BlockResult::ControlResult>& control) {
+void put_control_results(Hdf5Writer& file, const BlockResult& of) {
+  const std::vector<BlockResult::ControlResult>& control = of.control;
   if (control.empty()) return;
   using Result = BlockResult::ControlResult;
   file.matrix("control/adjusted", vectors3(control, [](const Result& c) { return c.adjusted; }), 3,
               {"m", "ground frame; NaN: not seen by two oriented images"});
   file.array("control/covariance", flattened<double>(column(control, [](const Result& c) { return c.covariance; })),
              {rows(control), 3, 3}, {"m^2", "posterior, of the adjusted position"});
+  if (!of.empirical.control.empty())
+    file.array("control/empirical_covariance", flattened<double>(of.empirical.control),
+               {rows(of.empirical.control), 3, 3}, {"m^2", "the same from the residuals"});
   std::vector<double> residuals;
   for (const Result& result : control)
     for (const Eigen::Vector2d& r : result.residual_px) residuals.insert(residuals.end(), {r.x(), r.y()});
@@ -284,7 +288,7 @@ void put_head(Hdf5Writer& file, const BlockResult& result) {
 }
 
 void put_tail(Hdf5Writer& file, const BlockResult& result) {
-  put_control_results(file, result.control);
+  put_control_results(file, result);
   put_free_parts(file, result.free_parts);
   put_observation_table(file, result.observation_table);
   put_seams(file, result.seams);
@@ -310,6 +314,9 @@ BlockResult get_head_and_tail(const Hdf5Reader& file) {
   result.tiles = get_tiles(file);
   get_precision(file, result);
   result.control = get_control_results(file, result.block);
+  if (file.has("control/empirical_covariance"))
+    result.empirical.control = square_matrices<Eigen::Matrix3d>(
+        file.array<double>("control/empirical_covariance", {rows(result.block.control_points), 3, 3}));
   get_free_parts(file, result);
   get_observation_table(file, result.observation_table);
   result.seams = get_seams(file);

@@ -14,6 +14,14 @@ std::int64_t row_count(const auto& items) { return static_cast<std::int64_t>(ite
 
 using MountCovariances = IndexedVector<RigIndex, std::vector<BlockResult::Matrix6>>;
 
+// The covariances of a result, formal or empirical, and the names of their datasets.
+template <typename Covariances>
+struct PrecisionOf {
+  Covariances& of;
+  std::string prefix;  // of the names
+  std::string name(const char* group, const char* dataset) const { return std::string(group) + "/" + prefix + dataset; }
+};
+
 // Writes one row per mount, in the order of the group 'mounts'.
 void put_mount_covariances(Hdf5Writer& file, const std::string& name, const MountCovariances& rigs) {
   std::vector<BlockResult::Matrix6> mounts;
@@ -50,40 +58,56 @@ void get_frame_covariances(const Hdf5Reader& file, const std::string& name, cons
         square_matrices<BlockResult::Matrix6>(file.array<double>(name, {row_count(block.frames), 6, 6})));
 }
 
-}  // namespace
-
-void put_precision(Hdf5Writer& file, const BlockResult& of) {
-  put_frame_covariances(file, "frames/covariance", of.frame_covariance,
+template <typename Covariances>
+void put_precision(Hdf5Writer& file, const PrecisionOf<Covariances>& precision) {
+  const auto& of = precision.of;
+  put_frame_covariances(file, precision.name("frames", "covariance"), of.frame_covariance,
                         "posterior, of (rotation increment about the ground axes, centre)");
-  put_frame_covariances(file, "frames/aligned_covariance", of.aligned_covariance,
+  put_frame_covariances(file, precision.name("frames", "aligned_covariance"), of.aligned_covariance,
                         "the same after the best-fit similarity of all positions");
   if (const BlockResult::JointCovariance& joint = of.joint_covariance; !joint.frames.empty()) {
-    file.group("joint", "poses of a small block together");
     const std::int64_t n = joint.matrix.rows();
-    file.vector("joint/frame", column(joint.frames, [](FrameIndex f) { return f.value; }),
+    file.vector(precision.name("joint", "frame"), column(joint.frames, [](FrameIndex f) { return f.value; }),
                 {"", "of the rows of the covariance, ascending"});
-    file.array("joint/covariance", std::vector<double>(joint.matrix.data(), joint.matrix.data() + joint.matrix.size()),
-               {n, n}, {"rad, m", "of the poses of a small block together"});
+    file.array(precision.name("joint", "covariance"),
+               std::vector<double>(joint.matrix.data(), joint.matrix.data() + joint.matrix.size()), {n, n},
+               {"rad, m", "of the poses of a small block together"});
   }
-  if (!of.camera_covariance.empty()) put_covariances(file, of.camera_covariance);
-  if (!of.mount_covariance.empty()) put_mount_covariances(file, "mounts/covariance", of.mount_covariance);
+  if (!of.camera_covariance.empty())
+    put_covariances(file, precision.name("cameras", "covariance"), of.camera_covariance);
+  if (!of.mount_covariance.empty())
+    put_mount_covariances(file, precision.name("mounts", "covariance"), of.mount_covariance);
 }
 
-void get_precision(const Hdf5Reader& file, BlockResult& of) {
-  const Block& block = of.block;
-  get_frame_covariances(file, "frames/covariance", block, of.frame_covariance);
-  get_frame_covariances(file, "frames/aligned_covariance", block, of.aligned_covariance);
-  if (const char* name = "joint/frame"; file.has(name)) {
+template <typename Covariances>
+void get_precision(const Hdf5Reader& file, const Block& block, const PrecisionOf<Covariances>& precision) {
+  auto& of = precision.of;
+  get_frame_covariances(file, precision.name("frames", "covariance"), block, of.frame_covariance);
+  get_frame_covariances(file, precision.name("frames", "aligned_covariance"), block, of.aligned_covariance);
+  if (const std::string name = precision.name("joint", "frame"); file.has(name)) {
     for (const std::int64_t frame : file.vector<std::int64_t>(name)) of.joint_covariance.frames.emplace_back(frame);
     const std::int64_t n = 6 * row_count(of.joint_covariance.frames);
-    const std::vector<double> values = file.array<double>("joint/covariance", {n, n});
+    const std::vector<double> values = file.array<double>(precision.name("joint", "covariance"), {n, n});
     of.joint_covariance.matrix = Eigen::Map<const Eigen::MatrixXd>(values.data(), n, n);
   }
-  if (const char* name = "cameras/covariance"; file.has(name))
+  if (const std::string name = precision.name("cameras", "covariance"); file.has(name))
     of.camera_covariance = IndexedVector<CameraIndex, Eigen::MatrixXd>(
-        get_covariances(file, column(block.cameras, [](const Camera& c) { return c.intrinsics.model(); })));
-  if (const char* name = "mounts/covariance"; file.has(name))
+        get_covariances(file, name, column(block.cameras, [](const Camera& c) { return c.intrinsics.model(); })));
+  if (const std::string name = precision.name("mounts", "covariance"); file.has(name))
     of.mount_covariance = get_mount_covariances(file, name, block.rigs);
+}
+
+}  // namespace
+
+void put_precision(Hdf5Writer& file, const BlockResult& result) {
+  if (!result.joint_covariance.frames.empty()) file.group("joint", "poses of a small block together");
+  put_precision(file, PrecisionOf<const BlockResult>{result, ""});
+  put_precision(file, PrecisionOf<const BlockResult::Empirical>{result.empirical, "empirical_"});
+}
+
+void get_precision(const Hdf5Reader& file, BlockResult& result) {
+  get_precision(file, result.block, PrecisionOf<BlockResult>{result, ""});
+  get_precision(file, result.block, PrecisionOf<BlockResult::Empirical>{result.empirical, "empirical_"});
 }
 
 }  // namespace megablock

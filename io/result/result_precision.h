@@ -1,4 +1,5 @@
-// Writes and reads the covariances of a result. Internal to io/.
+// Writes and reads the covariances of a result: the formal and the empirical ones, the latter with the prefix
+// "empirical_". Internal to io/.
 #pragma once
 
 #include "io/result/result.h"

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <stdexcept>
 #include <vector>
 
 #include "geometry/estimation/ransac.h"
@@ -227,8 +228,16 @@ double find_bend(const std::vector<const MatchedImages*>& pairs, const Sensor& s
 
 }  // namespace
 
+void FocalLengthOptions::check() const {
+  if (!(max_residual_px > 0)) throw std::invalid_argument("max_residual_px must be positive");
+  if (!(min_ratio > 0 && max_ratio > min_ratio)) throw std::invalid_argument("0 < min_ratio < max_ratio is needed");
+  if (min_inliers < 8 || min_pairs < 1 || max_pairs < min_pairs || threads < 1)
+    throw std::invalid_argument("at least 8 inliers, one pair, no more pairs at least than at most, one thread");
+}
+
 std::optional<FocalLength> focal_length_of(std::span<const MatchedImages> pairs, int width, int height,
                                            const FocalLengthOptions& options) {
+  options.check();
   const Sensor sensor{static_cast<double>(std::max(width, height)), 0.5 * std::hypot(width, height)};
   const std::vector<const MatchedImages*> usable = usable_pairs(pairs, sensor, options);
   if (std::ssize(usable) < options.min_pairs) return std::nullopt;

@@ -46,6 +46,7 @@ struct FocalLengthOptions {
   int max_pairs = 40;                      // pairs that are asked, the first that have enough inliers
   int min_pairs = 5;                       // fewest such pairs
   int threads = 1;
+  void check() const;  // throws std::invalid_argument
 };
 
 // Two images of one camera.

@@ -6,12 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "geometry/numbers/decompositions.h"
 #include "merge/plan/point_portions.h"
 #include "merge/plan/tree_workers.h"
 #include "merge/plan/unknowns.h"
 #include "merge/tile/cell_assembler.h"
+#include "merge/tile/cluster_scores.h"
 #include "merge/tile/point_equations.h"
 
 namespace megablock {
@@ -20,16 +22,21 @@ namespace {
 
 // Fills the front of a cell with all of the tile's residuals that the cell owns.
 void fill_cell(const TileProblem& problem, const TilePlan& plan, const TileState& state, const Sweep& sweep,
-               const PlanNode& node, PointEquations& equations, PairBlocks& pair_blocks, std::vector<double>& diagonal,
-               Front& front) {
+               const PlanNode& node, const ClusterWeights* clusters, PointEquations& equations, PairBlocks& pair_blocks,
+               std::vector<double>& diagonal, Front& front) {
   CellAssembler assembler(plan, front, pair_blocks);
+  std::optional<ClusterScores> scores;
+  if (clusters != nullptr) scores.emplace(problem, plan, *clusters, front);
   const std::vector<std::int32_t> points = plan.points[at(node.leaf)].rows();
   for (std::span<const std::int32_t> rest = points; !rest.empty();) {
     rest = rest.subspan(equations.linearise(rest, sweep));
     assembler.add_points(equations);
+    if (scores) scores->add_points(equations);
   }
-  visit_terms(problem, plan, state, sweep, at(node.leaf), [&](const TermResidual& term) { assembler.add_term(term); });
+  visit_terms(problem, plan, state, sweep, at(node.leaf),
+              [&](const TermResidual& term) { assembler.add_term(scores ? ClusterScores::with_formal(term) : term); });
   assembler.finish(diagonal);
+  if (scores) scores->finish();
 }
 
 // Adds the datum of a tile to a front. It is added where its unknown is eliminated or, for separator unknowns, at the
@@ -136,7 +143,8 @@ void TileCondenser::Work::eliminate(std::int64_t number) {
   if (node.leaf >= 0) {
     std::vector<double>& diagonal = diagonals_[at(node.leaf)];
     diagonal.assign(at(total_dimension(plan_.unknowns)), 0);
-    fill_cell(problem_, plan_, state_, sweep_, node, mine.equations, mine.pair_blocks, diagonal, front);
+    fill_cell(problem_, plan_, state_, sweep_, node, datum_.clusters, mine.equations, mine.pair_blocks, diagonal,
+              front);
   }
   for (std::int64_t child : {node.left, node.right}) {
     if (child < 0) continue;

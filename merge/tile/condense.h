@@ -15,6 +15,7 @@
 // (tile_linearisation.h). D is the diagonal of J'J.
 #pragma once
 
+#include <map>
 #include <memory>
 
 #include "adjust/problem/tile_problem.h"
@@ -41,8 +42,44 @@ struct TileCondensation {
   TileFactor factor;
 };
 
-// The constraints and right-hand sides that the datum of a free block adds to a tile (gauge.h). Empty when priors fix
-// the datum.
+// How far errors are correlated within whole images (cluster_scores.h). Sums are added in the order of cells and tiles.
+struct ImageSpread {
+  struct Sum {
+    double squares = 0, expected = 0;  // sum s'C s, and its mean for independent errors
+    void add(const Sum& other);
+    double ratio() const { return expected > 0 && squares > 0 ? squares / expected : 1; }
+  };
+  Sum images, fields;
+  std::map<std::int64_t, Sum> cameras;  // of the parameters of each camera of the block, from whole images
+  void add(const ImageSpread& other);
+  double inflation() const;
+  double ratio() const;  // rho of cluster_scores.h: that of fields with the inflation
+  // The factor of a camera's empirical covariance that has `reached` times the formal one in the mean.
+  double camera_inflation(std::int64_t camera, double reached) const;
+  Bytes to_bytes() const;
+  static ImageSpread from_bytes(const Bytes& bytes);
+};
+// The same of one cell, where the concentration of the tile is not known yet.
+struct CellSpread {
+  struct Field {
+    double squares = 0, leverage = 0, rank = 0;
+  };
+  ImageSpread images;
+  std::vector<Field> fields;
+  ImageSpread sums(double concentration) const;
+};
+
+// What the clusters of a tile's points need besides its problem (cluster_scores.h).
+struct ClusterWeights {
+  std::vector<std::uint8_t> leverages;  // [points] the trace h in units of 1 / 32; 0 where the point takes no part
+  std::vector<double> extents;          // [cameras] of the part of the images that has observations, px
+  double concentration = 1;             // of the hat matrices of single points
+  double inflation = 1;                 // of the squares of the scores, for errors that whole images share
+  double ratio = 1;                     // rho, of the squares of the scores over those of independent errors
+};
+
+// What a sweep adds to a tile besides its observations: the constraints and right-hand sides of the datum of a free
+// block (gauge.h), and the scores of its clusters (cluster_scores.h). Empty when priors fix the datum.
 struct TileDatum {
   struct Hold {
     UnknownId frame;
@@ -50,7 +87,9 @@ struct TileDatum {
     double weight = 1;
   };
   std::vector<Hold> holds;
-  Step columns{{}, 0, {}};  // further right-hand sides
+  Step columns{{}, 0, {}};                   // further right-hand sides
+  bool spread = false;                       // whether covariances come with TileCovariance::spread
+  const ClusterWeights* clusters = nullptr;  // of a sweep for the empirical covariances; else nullptr
 };
 
 // The directions that a block holds although priors determine them, but hardly.
@@ -127,6 +166,10 @@ struct TileCovariance {
   // io/evaluation/reliability.h), for residuals as the loss weights them: 1 - diag(J C J') / sigma^2. NaN for
   // observations that take no part. [observations]
   std::vector<float> redundancy_x, redundancy_y;
+  // tr P^2 over (tr P)^2 / r of single tie points, P their hat matrix of rank r (cluster_scores.h): 1 where all
+  // directions take part alike. From a sample of the points.
+  double concentration = 1;
+  ImageSpread spread;  // where asked for
   // [points] The further columns (3 x columns), where they were asked for.
   std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> point_columns;
 };

@@ -13,11 +13,16 @@
 //
 // The redundancy numbers of all observations add up to the degrees of freedom (io/block/observation_statistics.h). They
 // do not depend on how a free datum is held, because a similarity changes no residual.
+#include <algorithm>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "adjust/terms/prior_loss.h"
+#include "geometry/numbers/decompositions.h"
 #include "merge/plan/tree_workers.h"
 #include "merge/plan/unknowns.h"
+#include "merge/tile/cluster_scores.h"
 #include "merge/tile/condense.h"
 #include "merge/tile/point_equations.h"
 
@@ -31,13 +36,23 @@ ObservationKind image_kind(PointRole role) {
                                      : ObservationKind::kTieImage;
 }
 
+constexpr std::int64_t kSampled = 16;  // one in so many points tells the concentration
+
+struct CellStatistics {
+  ObservationTable observations;
+  double squares = 0, uniform = 0;  // sums of tr P^2, and of (tr P)^2 / r, over a sample of the points
+  CellSpread spread;
+};
+
 // The contributions of the cells that one thread works on. Each thread writes to places of its own.
 class CellCovariances {
  public:
   // `offsets`: first row of each of plan.unknowns in `columns`.
   CellCovariances(const TileProblem& problem, const TilePlan& plan, const TileState& state, const PointTables& tables,
-                  const Step& columns, const std::vector<std::int64_t>& offsets, TileCovariance& result)
-      : problem_(problem),
+                  const Step& columns, const std::vector<std::int64_t>& offsets, double own_share,
+                  const std::vector<double>* extents, TileCovariance& result)
+      : own_share_(own_share),
+        problem_(problem),
         plan_(plan),
         state_(state),
         columns_(columns),
@@ -45,11 +60,13 @@ class CellCovariances {
         result_(result),
         equations_(problem, state, tables),
         frame_sums_(plan.unknowns.size()),
-        row_of_unknown_(plan.unknowns.size(), -1) {}
+        row_of_unknown_(plan.unknowns.size(), -1) {
+    if (extents != nullptr) images_.emplace(problem, plan, *extents);
+  }
 
   // Adds the points and observations of a cell, from the covariance of its unknowns.
-  void add(std::size_t cell, const CovarianceMatrix& covariance, ObservationTable& observations) {
-    observations_ = &observations;
+  void add(std::size_t cell, const CovarianceMatrix& covariance, CellStatistics& statistics) {
+    observations_ = &statistics.observations;
     cell_ = covariance.matrix.data();
     const std::vector<std::int64_t> offsets = row_offsets(covariance.unknowns);
     cell_rows_ = offsets.back();
@@ -64,9 +81,15 @@ class CellCovariances {
       for (std::size_t i = 0; i < equations_.points().size(); ++i) {
         equations_.blocks(i, blocks_);
         add_point(i);
+        if (equations_.points()[i].point % kSampled == 0) add_concentration(i, statistics);
         if (columns_.columns > 1) add_point_columns(i);
+        if (images_) images_->add_point(equations_, i, leverage(equations_.points()[i]));
       }
     }
+    if (images_)
+      images_->finish([this](std::int64_t a, std::int64_t rows, std::int64_t b,
+                             std::int64_t columns) -> Eigen::MatrixXd { return covariance_of(a, rows, b, columns); },
+                      statistics.spread);
     visit_terms(problem_, plan_, state_, 0, cell, [&](const TermResidual& term) { add_term(term); });
   }
 
@@ -81,7 +104,7 @@ class CellCovariances {
   // C_ap of all unknowns a of the point, into with_point_, and C_pp.
   void add_point(std::size_t i) {
     const Eigen::Matrix3d inverse = equations_.inverse_factor(i);
-    Eigen::Matrix3d inner = Eigen::Matrix3d::Identity();
+    Eigen::Matrix3d inner = own_share_ * Eigen::Matrix3d::Identity();
     with_point_.resize(blocks_.size());
     for (std::size_t a = 0; a < blocks_.size(); ++a) {
       auto& sum = with_point_[a];
@@ -96,6 +119,62 @@ class CellCovariances {
     result_.points[at(point.point)] = covariance;
     add_image_redundancy(point, covariance);
     add_prior_redundancy(point.point, covariance);
+  }
+
+  // tr P, from the redundancy numbers. The point itself takes three.
+  double leverage(const PointEquations::Point& point) const {
+    double sum = -3;
+    for (std::int64_t lane = point.first; lane < point.last; ++lane) {
+      const std::size_t row = at(equations_.row_of(lane));
+      sum += 2.0 - result_.redundancy_x[row] - result_.redundancy_y[row];
+    }
+    return std::max(0.0, sum);
+  }
+
+  // P = R C R' with R the Jacobian of the other unknowns after elimination of the point.
+  void add_concentration(std::size_t i, CellStatistics& statistics) {
+    const PointEquations::Point& point = equations_.points()[i];
+    const Eigen::Index rows = 2 * point.observation_count();
+    if (problem_.points[at(point.point)].role != PointRole::kTie || rows < 4) return;
+    std::vector<std::pair<std::int64_t, Eigen::Index>> unknowns;  // with the first column
+    Eigen::Index width = 0;
+    const auto column_of = [&](std::int64_t unknown, Eigen::Index dimension) {
+      for (const auto& [known, column] : unknowns)
+        if (known == unknown) return column;
+      unknowns.emplace_back(unknown, width);
+      return std::exchange(width, width + dimension);
+    };
+    Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(rows, 0), by_point(rows, 3);
+    for (std::int64_t lane = point.first; lane < point.last; ++lane) {
+      const Eigen::Index row = 2 * (lane - point.first);
+      by_point.middleRows<2>(row) = equations_.by_point(lane);
+      const int count = equations_.jacobians(lane, jacobians_);
+      for (int a = 0; a < count; ++a) {
+        const auto& block = jacobians_[at(a)];
+        const Eigen::Index column = column_of(block.unknown, block.jacobian.cols());
+        if (width > jacobian.cols()) {
+          const Eigen::Index known = jacobian.cols();
+          jacobian.conservativeResize(Eigen::NoChange, width);
+          jacobian.rightCols(width - known).setZero();
+        }
+        jacobian.block(row, column, 2, block.jacobian.cols()) = block.jacobian;
+      }
+    }
+    Eigen::MatrixXd covariance(width, width);
+    const auto dimension = [&](std::size_t u) {
+      return (u + 1 < unknowns.size() ? unknowns[u + 1].second : width) - unknowns[u].second;
+    };
+    for (std::size_t a = 0; a < unknowns.size(); ++a)
+      for (std::size_t b = 0; b < unknowns.size(); ++b)
+        covariance.block(unknowns[a].second, unknowns[b].second, dimension(a), dimension(b)) =
+            covariance_of(unknowns[a].first, dimension(a), unknowns[b].first, dimension(b));
+    const Eigen::Matrix3d normal = by_point.transpose() * by_point;
+    jacobian -= by_point * solve_symmetric(normal, by_point.transpose() * jacobian);
+    const Eigen::MatrixXd hat = jacobian * covariance * jacobian.transpose();
+    const double trace = hat.trace();
+    if (!(trace > 0)) return;
+    statistics.squares += hat.squaredNorm();
+    statistics.uniform += trace * trace / static_cast<double>(rows - 3);
   }
 
   void add_image_redundancy(const PointEquations::Point& point, const Eigen::Matrix3d& covariance) {
@@ -175,6 +254,7 @@ class CellCovariances {
     result_.point_columns[at(equations_.points()[i].point)] = equations_.inverse_factor(i).transpose() * sum;
   }
 
+  const double own_share_;
   const TileProblem& problem_;
   const TilePlan& plan_;
   const TileState& state_;
@@ -182,6 +262,7 @@ class CellCovariances {
   const std::vector<std::int64_t>& offsets_;
   TileCovariance& result_;
   PointEquations equations_;
+  std::optional<ImageClusters> images_;
   std::vector<FrameSum> frame_sums_;           // reduce() fills them together with Y; they are not used
   std::vector<PointEquations::Block> blocks_;  // of the present point
   // These belong to the present cell.
@@ -197,13 +278,15 @@ class CellCovariances {
 class TileCovarianceBuilder {
  public:
   TileCovarianceBuilder(const TileProblem& problem, const TilePlan& plan, const TileState& state,
-                        const TileFactor& factor, const Step& columns)
+                        const TileFactor& factor, const Step& columns, double own_share, bool spread)
       : plan_(plan),
         factor_(factor),
         offsets_(row_offsets(plan.unknowns)),
         tables_(problem, plan, state),
-        cells_([&, this] {
-          return std::make_unique<CellCovariances>(problem, plan, state, tables_, columns, offsets_, result_);
+        extents_(observed_extents(problem)),
+        cells_([&, this, own_share, spread] {
+          return std::make_unique<CellCovariances>(problem, plan, state, tables_, columns, offsets_, own_share,
+                                                   spread ? &extents_ : nullptr, result_);
         }) {
     if (columns.columns > 1)
       result_.point_columns.assign(problem.points.size(), Eigen::MatrixXd::Zero(3, columns.columns - 1));
@@ -223,7 +306,7 @@ class TileCovarianceBuilder {
   TileCovariance build(CovarianceMatrix boundary) {
     result_.boundary = std::move(boundary);
     take(result_.boundary, plan_.boundary);
-    std::vector<ObservationTable> tables(plan_.points.size());  // [cells]
+    std::vector<CellStatistics> cells(plan_.points.size());
     // The whole covariance of a front (E and P) serves both of its children and is freed after them. A cell adds its
     // points as soon as its own is there.
     visit_parents_first<CovarianceMatrix>(plan_.cells.nodes, [&](std::int64_t n, const CovarianceMatrix* parent) {
@@ -232,11 +315,18 @@ class TileCovarianceBuilder {
       const CovarianceMatrix& outer = parent ? *parent : result_.boundary;
       CovarianceMatrix covariance = covariance_down(factor, outer.restricted_to(factor.separator)).whole();
       take(covariance, node.eliminated);
-      if (node.leaf >= 0) cells_.mine().add(at(node.leaf), covariance, tables[at(node.leaf)]);
+      if (node.leaf >= 0) cells_.mine().add(at(node.leaf), covariance, cells[at(node.leaf)]);
       return covariance;
     });
     // The tables are added in the order of the cells, so that the bits do not depend on the threads.
-    for (const ObservationTable& table : tables) result_.observations.add(table);
+    double squares = 0, uniform = 0;
+    for (const CellStatistics& cell : cells) {
+      result_.observations.add(cell.observations);
+      squares += cell.squares;
+      uniform += cell.uniform;
+    }
+    if (uniform > 0) result_.concentration = std::max(1.0, squares / uniform);
+    for (const CellStatistics& cell : cells) result_.spread.add(cell.spread.sums(result_.concentration));
     return std::move(result_);
   }
 
@@ -284,6 +374,7 @@ class TileCovarianceBuilder {
   std::vector<std::int64_t> offsets_;
   std::vector<std::int64_t> frame_of_, camera_of_, mount_of_;
   PointTables tables_;
+  std::vector<double> extents_;
   PerThread<CellCovariances> cells_;
   TileCovariance result_;
 };
@@ -296,7 +387,10 @@ TileCovariance covariance_tile(const TileProblem& problem, const TilePlan& plan,
   if (factor.empty())
     return covariance_tile(problem, plan, state, condense_tile(problem, plan, state, 0, datum).factor,
                            std::move(boundary), datum, columns);
-  return TileCovarianceBuilder(problem, plan, state, factor, columns).build(std::move(boundary));
+  // The own part of a point's covariance is in both C(0) and C(w). Its share w makes it part of the empirical one.
+  const double own_share = datum.clusters == nullptr ? 1 : 1 - kScoreWeight;
+  return TileCovarianceBuilder(problem, plan, state, factor, columns, own_share, datum.spread)
+      .build(std::move(boundary));
 }
 
 }  // namespace megablock

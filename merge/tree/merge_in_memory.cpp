@@ -3,6 +3,8 @@
 #include <limits>
 #include <utility>
 
+#include "merge/tile/cluster_scores.h"
+
 namespace megablock {
 
 namespace {
@@ -32,6 +34,7 @@ MergeInMemory::MergeInMemory(const MergeTree& tree, std::vector<TileProblem> pro
       states_(std::move(states)),
       unknown_steps_(problems_.size()) {
   for (std::size_t t = 0; t < problems_.size(); ++t) tile_plans_.push_back(runner_.tile_plan(t));
+  runner_.expect_scores();
   runner_.on_step([this](std::size_t row, const Step& step) { unknown_steps_[row] = step; });
 }
 
@@ -57,6 +60,26 @@ UpReport MergeInMemory::final_up() {
   });
   gauge_ = judge_gauge(posterior_.sums, posterior_.gauge);
   return {posterior_.sums};
+}
+
+void MergeInMemory::final_scores() {
+  empirical_.assign(problems_.size(), {});
+  empirical_frames_ = posterior_.frames;
+  const CovarianceMatrix scored =
+      runner_.scored_posterior([this](const RankTile& tile, const TileCovariance& of_scores) {
+        const auto t = static_cast<std::size_t>(tile.tile);
+        TileCovariance& empirical = empirical_[t] = covariances_[t];
+        const auto change = [](auto& formal, const auto& with_scores) {
+          for (std::size_t i = 0; i < formal.size(); ++i) formal[i] = empirical_covariance(formal[i], with_scores[i]);
+        };
+        change(empirical.frames, of_scores.frames);
+        change(empirical.aligned_frames, of_scores.aligned_frames);
+        change(empirical.cameras, of_scores.cameras);
+        change(empirical.mounts, of_scores.mounts);
+        change(empirical.points, of_scores.points);
+      });
+  for (std::size_t i = 0; i < scored.matrix.size(); ++i)
+    empirical_frames_.matrix[i] = (empirical_frames_.matrix[i] - scored.matrix[i]) / kScoreWeight;
 }
 
 const std::vector<TileStep>& MergeInMemory::steps() const {

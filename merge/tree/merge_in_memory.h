@@ -29,6 +29,10 @@ class MergeInMemory : public TreeRunner {
   const std::vector<TileCovariance>& covariances() const { return covariances_; }
   // Of all frames of a small block together (MergeTreeRunner::Posterior).
   const CovarianceMatrix& frame_covariance() const { return posterior_.frames; }
+  // After final_up(): the empirical covariances, by tile, and those of all frames of a small block.
+  void final_scores();
+  const std::vector<TileCovariance>& empirical_covariances() const { return empirical_; }
+  const CovarianceMatrix& empirical_frame_covariance() const { return empirical_frames_; }
   const std::vector<SeamReport>& seams() const { return posterior_.seams; }
   const std::vector<TileCheck>& tile_checks() const { return posterior_.tile_checks; }
   const GaugeReport& gauge() const { return gauge_; }
@@ -55,7 +59,8 @@ class MergeInMemory : public TreeRunner {
   std::vector<Step> unknown_steps_;      // [tiles] of the last down()
   mutable std::vector<TileStep> steps_;  // [tiles] with the points; made when they are first asked for
   MergeTreeRunner::Posterior posterior_;
-  std::vector<TileCovariance> covariances_;
+  std::vector<TileCovariance> covariances_, empirical_;
+  CovarianceMatrix empirical_frames_;
   GaugeReport gauge_;
 };
 

@@ -79,6 +79,9 @@ class MergeTreeRunner : public TreeRunner {
   // further right-hand sides.
   void expect_posterior() { posterior_expected_ = true; }
 
+  // Says before posterior() that scored_posterior() follows it.
+  void expect_scores() { scores_expected_ = true; }
+
   // Collective, at the solution: runs a sweep up with lambda = 0, checks the seams, finds the datum and computes the
   // covariances.
   struct Posterior {
@@ -90,10 +93,14 @@ class MergeTreeRunner : public TreeRunner {
     // The covariance of all frames together, on every rank; of a free datum under inner constraints. Only for a block
     // of at most kMostFramesWithCovariances frames, else empty.
     CovarianceMatrix frames;
+    ImageSpread spread;  // of the whole block, on every rank; where expect_scores() was called
   };
   // Calls `visit` once for each tile of this rank with its covariances, which are not stored.
   using VisitCovariance = std::function<void(const RankTile&, const TileCovariance&)>;
   Posterior posterior(const VisitCovariance& visit = {});
+  // Collective, after posterior(): the empirical covariances in the same way (merge/tile/cluster_scores.h). `visit`
+  // gets C(w), from which empirical_covariance() follows with the formal one. Returns C(w) of Posterior::frames.
+  CovarianceMatrix scored_posterior(const VisitCovariance& visit);
 
   // The unknowns that occur in the kept residuals of a tile. The reference is valid until another tile is asked for.
   const UnknownList& unknowns(std::size_t row) const { return tile_plans_[row].unknowns; }
@@ -186,7 +193,10 @@ class MergeTreeRunner : public TreeRunner {
   std::vector<std::int64_t>
       sent_subtrees_;  // recorded subtrees of this sweep whose update has left this rank's own subtrees
   BlockGauge gauge_;
-  HeldAgainstPriors held_before_;               // of the last sweep up
+  HeldAgainstPriors held_before_;                // of the last sweep up
+  std::vector<ClusterWeights> cluster_weights_;  // [tiles_] of the last posterior()
+  bool scores_expected_ = false;
+  bool with_scores_ = false;                    // the sweep adds the scores of clusters
   DatumColumns columns_ = DatumColumns::kNone;  // the further right-hand sides of the sweep
   UnknownList block_frames_;                    // of the whole block, where columns_ is kFrames
   bool check_seams_ = false;

@@ -7,9 +7,13 @@
 // The covariances then come down the tree: each front gets C_PP from its parent and gives C_EE and C_PE
 // (front_covariance.cpp). The covariances of a tile are not kept after its visit, so that those of the whole block are
 // never in memory together.
+//
+// The empirical covariances need a second sweep up and down, with the scores of the clusters. What whole
+// images tell of them is found in the first sweep down (cluster_scores.h).
 #include <algorithm>
 #include <utility>
 
+#include "merge/tile/cluster_scores.h"
 #include "merge/tree/gather_by_tile.h"
 #include "merge/tree/merge_tree_runner.h"
 #include "merge/tree/sweep_values.h"
@@ -66,6 +70,8 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
 
   std::vector<TileCheck> checks(tiles_.size());
   std::vector<ObservationTable> tables(tiles_.size());
+  std::vector<ImageSpread> spreads(tiles_.size());
+  cluster_weights_.assign(tiles_.size(), {});
   std::size_t last = 0;
   covariances_down(
       [&](std::size_t row, const NodeFactors& factors, const CovarianceMatrix& separator) {
@@ -74,6 +80,8 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
       },
       [&](const RankTile& tile, const TileCovariance& covariance) {
         tables[last] = covariance.observations;
+        cluster_weights_[last] = cluster_weights(tile.problem, covariance);
+        spreads[last] = covariance.spread;
         if (visit) visit(tile, covariance);
       });
   check_seams_ = false;
@@ -83,6 +91,12 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
   posterior.tile_checks = gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, checks);
   for (const ObservationTable& table : gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, tables))
     posterior.observations.add(table);
+  for (const ImageSpread& spread : gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, spreads))
+    posterior.spread.add(spread);
+  for (ClusterWeights& weights : cluster_weights_) {
+    weights.inflation = posterior.spread.inflation();
+    weights.ratio = posterior.spread.ratio();
+  }
 
   // Each rank knows the seams of its own nodes; all get all of them, in the order of the nodes.
   ByteWriter writer;
@@ -95,6 +109,20 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
   std::sort(posterior.seams.begin(), posterior.seams.end(),
             [](const SeamReport& a, const SeamReport& b) { return a.node < b.node; });
   return posterior;
+}
+
+// Nothing is recorded of this sweep: a killed run repeats the posterior from its beginning.
+CovarianceMatrix MergeTreeRunner::scored_posterior(const VisitCovariance& visit) {
+  SweepRecorder* const recorder = std::exchange(recorder_, nullptr);
+  with_scores_ = true;
+  CovarianceMatrix frames = frame_covariance_of_small_block();
+  if (gauge_.free()) columns_ = DatumColumns::kSimilarities;
+  condense_all(0);
+  covariances_down([](std::size_t, const NodeFactors&, const CovarianceMatrix&) {}, visit);
+  columns_ = DatumColumns::kNone;
+  with_scores_ = false;
+  recorder_ = recorder;
+  return frames;
 }
 
 }  // namespace megablock

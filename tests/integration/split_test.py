@@ -10,7 +10,7 @@ import tempfile
 from program import BAD_INPUT, megablock
 
 SEEDS = int(sys.argv[1]) if len(sys.argv) > 1 else 6  # program.py has taken the program
-FIGURES = [(kind, "formal") for kind in ("positions", "rotations", "cameras")]
+FIGURES = [(kind, sigma) for kind in ("positions", "rotations", "cameras") for sigma in ("formal", "empirical")]
 
 
 def ratio(halves, kind, sigma):

@@ -85,11 +85,12 @@ BlockResult assemble_result(const Job& job, const JobRecord& record, Block& bloc
   result.block = std::exchange(block, {});
   result.state = std::move(outcome.state);
   result.tiles = tiles;
-  result.frame_covariance = std::move(outcome.frame_covariance);
-  result.aligned_covariance = std::move(outcome.aligned_covariance);
-  result.joint_covariance = std::move(outcome.joint_covariance);
-  result.camera_covariance = std::move(outcome.camera_covariance);
-  result.mount_covariance = std::move(outcome.mount_covariance);
+  result.frame_covariance = std::move(outcome.formal.frame_covariance);
+  result.aligned_covariance = std::move(outcome.formal.aligned_covariance);
+  result.joint_covariance = std::move(outcome.formal.joint_covariance);
+  result.camera_covariance = std::move(outcome.formal.camera_covariance);
+  result.mount_covariance = std::move(outcome.formal.mount_covariance);
+  result.empirical = std::move(outcome.empirical);
   append_control(result, parts);
   find_boundary(result, parts);
   result.chi2 = outcome.chi2;

@@ -171,6 +171,7 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
     runner.record_sweeps(recorder);
     return_freed_memory();  // memory from which the plans were made
     if (last) runner.expect_posterior();
+    if (last && job.settings.merge.empirical_sigmas) runner.expect_scores();
     adjust_globally(runner, options, position.global, [&](const GlobalState& state) {
       return_freed_memory();
       say_iteration(job, state, options);
@@ -187,6 +188,7 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
     follow(block, tiles);
     if (last) {
       find_posterior(job, inputs, references, runner, adjusted);
+      if (job.settings.merge.empirical_sigmas) find_empirical(job, runner, adjusted);
       adjusted.costs = gather_costs(job, tiles, runner);
       say_costs(job, adjusted.costs);
       break;

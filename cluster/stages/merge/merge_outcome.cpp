@@ -13,10 +13,12 @@
 #include "cluster/mpi/matrix_bytes.h"
 #include "cluster/stages/merge/merge_start.h"
 #include "cluster/stages/result/provenance.h"
+#include "geometry/numbers/decompositions.h"
 #include "io/base/error.h"
 #include "io/base/file_error.h"
 #include "merge/checks/seam_text.h"
 #include "merge/datum/gauge.h"
+#include "merge/tile/cluster_scores.h"
 #include "merge/tree/gather_by_tile.h"
 
 namespace megablock {
@@ -50,7 +52,8 @@ Bytes read_file(const std::string& path) {
   return bytes;
 }
 
-// Writes the covariances of the frames, cameras and mounts of a tile; zero for an unknown that the tile does not touch.
+// Writes the covariances of the frames, cameras, mounts and control points of a tile; zero for an unknown that the tile
+// does not touch.
 void write_covariances(const std::string& path, const TileProblem& problem, const TileCovariance& covariance) {
   ByteWriter writer;
   writer.values(problem.frames);
@@ -60,6 +63,15 @@ void write_covariances(const std::string& path, const TileProblem& problem, cons
   write_matrices(writer, covariance.mounts);
   writer.values(problem.cameras);
   for (const Eigen::MatrixXd& camera : covariance.cameras) write_matrix(writer, camera);
+  std::vector<std::int64_t> control;
+  std::vector<Eigen::Matrix3d> of_control;
+  for (std::size_t p = 0; p < problem.points.size() && p < covariance.points.size(); ++p)
+    if (problem.points[p].role != PointRole::kTie) {
+      control.push_back(problem.points[p].index);
+      of_control.push_back(covariance.points[p]);
+    }
+  writer.values(control);
+  write_matrices(writer, of_control);
   write_file(path, writer.take());
 }
 
@@ -70,30 +82,70 @@ void take_first(const Matrix& from, Matrix& to) {
   if (to.isZero(0)) to = from;
 }
 
-void read_covariances(const std::string& path, MergeOutcome& outcome) {
+void read_covariances(const std::string& path, BlockResult::Empirical& to) {
   const Bytes bytes = read_file(path);
   ByteReader reader(bytes);
   const auto frames = reader.values<FrameIndex>();
   const auto of_frames = read_matrices<BlockResult::Matrix6>(reader);
-  for (std::size_t f = 0; f < frames.size(); ++f) take_first(of_frames[f], outcome.frame_covariance[frames[f]]);
+  for (std::size_t f = 0; f < frames.size(); ++f) take_first(of_frames[f], to.frame_covariance[frames[f]]);
   const auto aligned = read_matrices<BlockResult::Matrix6>(reader);
-  for (std::size_t f = 0; f < aligned.size(); ++f) take_first(aligned[f], outcome.aligned_covariance[frames[f]]);
+  for (std::size_t f = 0; f < aligned.size(); ++f) take_first(aligned[f], to.aligned_covariance[frames[f]]);
   const auto mounts = reader.values<MountId>();
   const auto of_mounts = read_matrices<BlockResult::Matrix6>(reader);
   for (std::size_t m = 0; m < mounts.size(); ++m)
-    take_first(of_mounts[m], outcome.mount_covariance[mounts[m].rig][static_cast<std::size_t>(mounts[m].mount)]);
+    take_first(of_mounts[m], to.mount_covariance[mounts[m].rig][static_cast<std::size_t>(mounts[m].mount)]);
   for (const CameraIndex camera : reader.values<CameraIndex>())
-    take_first(read_matrix(reader), outcome.camera_covariance[camera]);
+    take_first(read_matrix(reader), to.camera_covariance[camera]);
+  const auto control = reader.values<std::int64_t>();
+  const auto of_control = read_matrices<Eigen::Matrix3d>(reader);
+  for (std::size_t p = 0; p < control.size(); ++p) to.control[static_cast<std::size_t>(control[p])] = of_control[p];
 }
 
-void read_covariances(const Job& job, const Tiles& tiles, MergeOutcome& outcome) {
-  outcome.frame_covariance.assign(outcome.state.frames.size(), BlockResult::Matrix6::Zero());
-  outcome.aligned_covariance = outcome.frame_covariance;
-  for (const Intrinsics& camera : outcome.state.cameras)
-    outcome.camera_covariance.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
-  for (const std::vector<Pose>& rig : outcome.state.mounts)
-    outcome.mount_covariance.emplace_back(rig.size(), BlockResult::Matrix6::Zero());
-  for (std::int64_t tile = 0; tile < tiles.tile_count; ++tile) read_covariances(covariance_path(job, tile), outcome);
+BlockResult::Empirical read_covariances(const Job& job, const Tiles& tiles, const BlockState& state,
+                                        std::string (*path)(const Job&, std::int64_t)) {
+  BlockResult::Empirical all;
+  all.frame_covariance.assign(state.frames.size(), BlockResult::Matrix6::Zero());
+  all.aligned_covariance = all.frame_covariance;
+  for (const Intrinsics& camera : state.cameras)
+    all.camera_covariance.push_back(Eigen::MatrixXd::Zero(camera.size(), camera.size()));
+  for (const std::vector<Pose>& rig : state.mounts)
+    all.mount_covariance.emplace_back(rig.size(), BlockResult::Matrix6::Zero());
+  all.control.assign(job.block.control_points.size(), Eigen::Matrix3d::Zero());
+  for (std::int64_t tile = 0; tile < tiles.tile_count; ++tile) read_covariances(path(job, tile), all);
+  return all;
+}
+
+// Replaces C(w) by the empirical covariance.
+void to_empirical(const BlockResult::Empirical& formal, BlockResult::Empirical& scored) {
+  const auto change = [](const auto& all, auto& of_scores) {
+    auto from = all.begin();
+    for (auto& matrix : of_scores) matrix = empirical_covariance(*from++, matrix);
+  };
+  change(formal.frame_covariance, scored.frame_covariance);
+  change(formal.aligned_covariance, scored.aligned_covariance);
+  change(formal.camera_covariance, scored.camera_covariance);
+  for (std::size_t r = 0; r < formal.mount_covariance.size(); ++r) {
+    const RigIndex rig(static_cast<std::int64_t>(r));
+    change(formal.mount_covariance[rig], scored.mount_covariance[rig]);
+  }
+  change(formal.control, scored.control);
+  if (!formal.joint_covariance.frames.empty())
+    scored.joint_covariance.matrix =
+        empirical_covariance(formal.joint_covariance.matrix, scored.joint_covariance.matrix);
+}
+
+// Raises the empirical covariance of each camera to what whole images show of its parameters.
+void inflate_cameras(const ImageSpread& spread, MergeOutcome& outcome) {
+  for (CameraIndex c(0); outcome.empirical.camera_covariance.contains(c); ++c.value) {
+    const Eigen::MatrixXd& formal = outcome.formal.camera_covariance[c];
+    Eigen::MatrixXd& empirical = outcome.empirical.camera_covariance[c];
+    std::vector<Eigen::Index> free;
+    for (Eigen::Index k = 0; k < formal.rows(); ++k)
+      if (formal(k, k) > 0) free.push_back(k);
+    if (free.empty()) continue;
+    const double reached = solve_symmetric(formal(free, free), empirical(free, free)).trace();
+    empirical *= spread.camera_inflation(c.value, reached / static_cast<double>(free.size()));
+  }
 }
 
 BlockResult::JointCovariance joint_covariance(const CovarianceMatrix& frames) {
@@ -114,6 +166,10 @@ std::string covariance_path(const Job& job, std::int64_t tile) {
   return job.store.path("merge/parts/" + std::to_string(tile) + ".covariances");
 }
 
+std::string scored_path(const Job& job, std::int64_t tile) {
+  return job.store.path("merge/parts/" + std::to_string(tile) + ".scored");
+}
+
 void find_posterior(const Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
                     MergeTreeRunner& runner, Adjusted& adjusted) {
   std::filesystem::create_directories(job.store.path("merge/parts"));
@@ -128,6 +184,12 @@ void find_posterior(const Job& job, const MergeInputs& inputs, const std::vector
     adjusted.parts.back().component = component;
     adjusted.parts.back().motion =
         common_motion(tile.problem, tile.state, references[static_cast<std::size_t>(component)]);
+  });
+}
+
+void find_empirical(const Job& job, MergeTreeRunner& runner, Adjusted& adjusted) {
+  adjusted.scored_frames = runner.scored_posterior([&](const RankTile& tile, const TileCovariance& covariance) {
+    write_covariances(scored_path(job, tile.tile), tile.problem, covariance);
   });
 }
 
@@ -179,8 +241,14 @@ std::vector<std::string> judge_kept(const std::vector<TilePart>& parts) {
 MergeOutcome make_outcome(const Job& job, Adjusted& adjusted, const Tiles& tiles) {
   MergeOutcome outcome;
   outcome.state = std::move(adjusted.state);
-  read_covariances(job, tiles, outcome);
-  outcome.joint_covariance = joint_covariance(adjusted.posterior.frames);
+  outcome.formal = read_covariances(job, tiles, outcome.state, covariance_path);
+  outcome.formal.joint_covariance = joint_covariance(adjusted.posterior.frames);
+  if (job.settings.merge.empirical_sigmas) {
+    outcome.empirical = read_covariances(job, tiles, outcome.state, scored_path);
+    outcome.empirical.joint_covariance = joint_covariance(adjusted.scored_frames);
+    to_empirical(outcome.formal, outcome.empirical);
+    inflate_cameras(adjusted.posterior.spread, outcome);
+  }
   const SubtreeSums& sums = adjusted.posterior.sums;
   outcome.chi2 = sums.weighted_squares;
   outcome.degrees_of_freedom =
@@ -189,7 +257,10 @@ MergeOutcome make_outcome(const Job& job, Adjusted& adjusted, const Tiles& tiles
   outcome.global_iterations = adjusted.position.global.accepted;
   outcome.newton_decrement = std::sqrt(sums.decrement_squared);
   const BlockGauge& gauge = adjusted.posterior.gauge;
-  if (!gauge.free()) outcome.aligned_covariance = {};
+  if (!gauge.free()) {
+    outcome.formal.aligned_covariance = {};
+    outcome.empirical.aligned_covariance = {};
+  }
   outcome.gauge = judge_gauge(sums, gauge, names_of(job.block)).text;
   for (const BlockComponent& part : gauge.components)
     if (!part.columns.empty()) {

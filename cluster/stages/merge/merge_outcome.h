@@ -14,10 +14,8 @@ namespace megablock {
 // Figures of the merge that do not belong to a tile.
 struct MergeOutcome {
   BlockState state;
-  IndexedVector<FrameIndex, BlockResult::Matrix6> frame_covariance, aligned_covariance;
-  BlockResult::JointCovariance joint_covariance;
-  IndexedVector<CameraIndex, Eigen::MatrixXd> camera_covariance;
-  IndexedVector<RigIndex, std::vector<BlockResult::Matrix6>> mount_covariance;
+  BlockResult::Empirical formal;     // without control points
+  BlockResult::Empirical empirical;  // empty: not asked for
   double chi2 = 0;
   std::int64_t degrees_of_freedom = 0;
   double variance_factor() const { return degrees_of_freedom > 0 ? chi2 / static_cast<double>(degrees_of_freedom) : 1; }
@@ -33,8 +31,9 @@ struct MergeOutcome {
 // An adjusted block as one rank holds it.
 struct Adjusted {
   MergeTreeRunner::Posterior posterior;
-  std::vector<TilePart> parts;  // parts of the tiles of this rank
-  double image_sigma_px = 0;    // sigma of the tie point observations
+  CovarianceMatrix scored_frames;  // Posterior::frames with the scores of clusters
+  std::vector<TilePart> parts;     // parts of the tiles of this rank
+  double image_sigma_px = 0;       // sigma of the tie point observations
   MergePosition position;
   MergeCosts costs;  // costs of the last adjustment
   BlockState state;
@@ -45,11 +44,16 @@ struct Adjusted {
 // result is written. The files lie beside the checkpoints and are removed with them.
 std::string part_path(const Job& job, std::int64_t tile);
 std::string covariance_path(const Job& job, std::int64_t tile);
+// The same with the scores of clusters, from which the empirical covariances follow (merge/tile/cluster_scores.h).
+std::string scored_path(const Job& job, std::int64_t tile);
 
 // Collective. Computes the covariances at the solution and writes each tile's part of the result. `references` are
 // those of the block's components.
 void find_posterior(const Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
                     MergeTreeRunner& runner, Adjusted& adjusted);
+
+// Collective, after find_posterior(): writes each tile's covariances with the scores of clusters.
+void find_empirical(const Job& job, MergeTreeRunner& runner, Adjusted& adjusted);
 
 // Collective. The parts of all tiles, on every rank.
 std::vector<TilePart> gather_parts(const Job& job, const Adjusted& adjusted, std::size_t tile_count);

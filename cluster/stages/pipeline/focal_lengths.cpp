@@ -214,7 +214,10 @@ std::string take(const Finding& finding, Camera& camera) {
           : fmt::format("camera '{}': the headers tell no focal length; the block starts with {}", camera.name, found);
   camera.intrinsics[kFocal] = finding.focal_px;
   camera.focal_known = finding.sigma > 0 && finding.sigma <= kKnown;
-  camera.prior_sigma = default_intrinsic_sigmas(camera);
+  ParameterMask estimated = 0;
+  for (int p = 0; p < camera.intrinsics.size(); ++p)
+    if (camera.prior_sigma[static_cast<std::size_t>(p)] > 0) estimated |= mask_of(p);
+  camera.prior_sigma = default_intrinsic_sigmas(camera, estimated);
   return note;
 }
 

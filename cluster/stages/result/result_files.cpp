@@ -44,6 +44,8 @@ void write_result_files(const JobStore& store, PagedTables& tables, std::uint64_
   map_blocks_from(kColumn);
   tables.put(result.frame_covariance);
   tables.put(result.aligned_covariance);
+  tables.put(result.empirical.frame_covariance);
+  tables.put(result.empirical.aligned_covariance);
   const auto release = [&tables] { tables.release(); };
   const auto release_all = [&tables] {
     tables.release();

@@ -28,14 +28,16 @@ void print_angles(TextWriter& writer, const Eigen::Quaterniond& rotation) {
 // projection centre is C + R' c, where c is the place of the camera in the rig. The increment w of the frame makes R
 // into R Exp(w), and R' c into Exp(-w) R' c = R' c - w x R' c, so it moves the centre by [R' c]x w. With J = (I 0; [R'
 // c]x I) the covariance is J C J'. The covariance of the mount itself is not included.
-BlockResult::Matrix6 image_covariance(const ExportView& view, std::int64_t i) {
+BlockResult::Matrix6 image_covariance(const ExportView& view, std::int64_t i,
+                                      const IndexedVector<FrameIndex, BlockResult::Matrix6>& frames) {
   const FrameIndex frame = view.image(i).frame;
   BlockResult::Matrix6 move = BlockResult::Matrix6::Identity();
   move.bottomLeftCorner<3, 3>() = skew<double>(view.pose(i).centre - view.result.state.frames[frame].centre);
-  return move * view.result.frame_covariance[frame] * move.transpose();
+  return move * frames[frame] * move.transpose();
 }
 
-constexpr const char* kSigmaColumns = ",sigma_{0}_m,sigma_{1}_m,sigma_{2}_m,sigma_rotation_deg";
+constexpr const char* kSigmaColumns = ",{3}sigma_{0}_m,{3}sigma_{1}_m,{3}sigma_{2}_m,{3}sigma_rotation_deg";
+constexpr const char* kEmpirical = "empirical_";
 
 // Prints the sigmas along the axes into which `to_axes` turns those of the ground frame.
 void print_sigmas(TextWriter& writer, const BlockResult::Matrix6& covariance, const Eigen::Quaterniond& to_axes) {
@@ -47,10 +49,12 @@ void print_sigmas(TextWriter& writer, const BlockResult::Matrix6& covariance, co
 }
 
 void write_local(const ExportView& view, const std::string& path) {
-  const bool sigmas = !view.result.frame_covariance.empty();
+  const bool sigmas = !view.result.frame_covariance.empty(),
+             empirical = !view.result.empirical.frame_covariance.empty();
   TextWriter writer(path);
   writer.print("image,frame,camera,x_m,y_m,z_m,omega_deg,phi_deg,kappa_deg,yaw_deg,pitch_deg,roll_deg");
-  if (sigmas) writer.print(kSigmaColumns, "x", "y", "z");
+  if (sigmas) writer.print(kSigmaColumns, "x", "y", "z", "");
+  if (empirical) writer.print(kSigmaColumns, "x", "y", "z", kEmpirical);
   writer.print("\n");
   for (std::int64_t i = 0; i < view.image_count(); ++i) {
     const Image& image = view.image(i);
@@ -60,7 +64,12 @@ void write_local(const ExportView& view, const std::string& path) {
                  csv_field(view.result.block.cameras[view.camera_index(i)].name), pose.centre.x(), pose.centre.y(),
                  pose.centre.z());
     print_angles(writer, pose.rotation);
-    if (sigmas) print_sigmas(writer, image_covariance(view, i), Eigen::Quaterniond::Identity());
+    const auto& result = view.result;
+    if (sigmas)
+      print_sigmas(writer, image_covariance(view, i, result.frame_covariance), Eigen::Quaterniond::Identity());
+    if (empirical)
+      print_sigmas(writer, image_covariance(view, i, result.empirical.frame_covariance),
+                   Eigen::Quaterniond::Identity());
     writer.print("\n");
   }
   writer.close();
@@ -69,9 +78,11 @@ void write_local(const ExportView& view, const std::string& path) {
 void write_wgs84(const ExportView& view, const std::string& path) {
   const Georeference georeference(view.result.block.ground);
   TextWriter writer(path);
-  const bool sigmas = !view.result.frame_covariance.empty();
+  const bool sigmas = !view.result.frame_covariance.empty(),
+             empirical = !view.result.empirical.frame_covariance.empty();
   writer.print("image,latitude_deg,longitude_deg,height_m,omega_deg,phi_deg,kappa_deg,yaw_deg,pitch_deg,roll_deg");
-  if (sigmas) writer.print(kSigmaColumns, "east", "north", "up");
+  if (sigmas) writer.print(kSigmaColumns, "east", "north", "up", "");
+  if (empirical) writer.print(kSigmaColumns, "east", "north", "up", kEmpirical);
   writer.print("\n");
   for (std::int64_t i = 0; i < view.image_count(); ++i) {
     const Pose pose = view.pose(i);
@@ -81,7 +92,8 @@ void write_wgs84(const ExportView& view, const std::string& path) {
     const Eigen::Quaterniond own = georeference.own_from_block(position);
     // R maps axes of the block's frame; R own' maps those of the place of the image.
     print_angles(writer, pose.rotation * own.conjugate());
-    if (sigmas) print_sigmas(writer, image_covariance(view, i), own);
+    if (sigmas) print_sigmas(writer, image_covariance(view, i, view.result.frame_covariance), own);
+    if (empirical) print_sigmas(writer, image_covariance(view, i, view.result.empirical.frame_covariance), own);
     writer.print("\n");
   }
   writer.close();
@@ -104,8 +116,11 @@ void write_cameras(const BlockResult& result, const std::string& path) {
   TextWriter writer(path);
   writer.print("name,width,height,model");
   for (const std::string& name : names) writer.print(",{}", name);
+  const auto& empirical = result.empirical.camera_covariance;
   if (!result.camera_covariance.empty())
     for (const std::string& name : names) writer.print(",sigma_{}", name);
+  if (!empirical.empty())
+    for (const std::string& name : names) writer.print(",{}sigma_{}", kEmpirical, name);
   writer.print("\n");
   for (std::size_t c = 0; c < result.block.cameras.size(); ++c) {
     const CameraIndex index(static_cast<std::int64_t>(c));
@@ -117,11 +132,12 @@ void write_cameras(const BlockResult& result, const std::string& path) {
         writer.print(",{}", k[*p]);
       else
         writer.print(",");
-    for (std::size_t i = 0; i < names.size() && !result.camera_covariance.empty(); ++i)
-      if (const auto p = find_parameter(k.model(), names[i]))
-        writer.print(",{:.6g}", std::sqrt(result.camera_covariance[index](*p, *p)));
-      else
-        writer.print(",");
+    for (const auto* covariances : {&result.camera_covariance, &empirical})
+      for (std::size_t i = 0; i < names.size() && !covariances->empty(); ++i)
+        if (const auto p = find_parameter(k.model(), names[i]))
+          writer.print(",{:.6g}", std::sqrt(std::max(0.0, (*covariances)[index](*p, *p))));
+        else
+          writer.print(",");
     writer.print("\n");
   }
   writer.close();

@@ -73,7 +73,10 @@ std::string correlation_table(const BlockResult& result, CameraIndex index) {
 std::string camera_table(const BlockResult& result, CameraIndex index) {
   const Camera& camera = result.block.cameras[index];
   const bool adjusted = result.state.cameras.contains(index), sigmas = result.camera_covariance.contains(index);
-  Table table({"parameter", "start", "adjusted", "change", "sigma", "÷ sigma", "prior"});
+  const bool both = result.empirical.camera_covariance.contains(index);
+  std::vector<std::string> headings{"parameter", "start", "adjusted", "change", "sigma", "÷ sigma", "prior"};
+  if (both) headings.insert(headings.begin() + 5, "empirical sigma");
+  Table table(std::move(headings));
   const CameraModel& model = camera.intrinsics.model();
   for (int k = 0; k < parameter_count(model); ++k) {
     const auto at = static_cast<std::size_t>(k);
@@ -86,14 +89,16 @@ std::string camera_table(const BlockResult& result, CameraIndex index) {
     const double ratio = held ? kUnknown : std::abs(now - neutral(camera, k)) / sigma;
     // A focal length has no neutral value to be tested against.
     const bool tested = k != kFocal && std::isfinite(ratio);
-    table.add(
-        {parameter_name(model, k) + (unit == ParameterUnit::kPixels ? " [px]" : ""), with_digits(unit, start, fixed),
-         with_digits(unit, now, fixed), with_digits(unit, now - start, with_sign),
-         held ? "held" : significant(sigma, 2), tested ? fixed(ratio, 1) : "",
-         prior == 0             ? "held"
-         : std::isfinite(prior) ? "σ " + significant(prior, 2)
-                                : "free"},
-        tested && ratio < kSignificant ? "weak" : "");
+    std::vector<std::string> cells{parameter_name(model, k) + (unit == ParameterUnit::kPixels ? " [px]" : ""),
+                                   with_digits(unit, start, fixed), with_digits(unit, now, fixed),
+                                   with_digits(unit, now - start, with_sign), held ? "held" : significant(sigma, 2)};
+    if (both) {
+      const double empirical = std::sqrt(std::max(0.0, result.empirical.camera_covariance[index](k, k)));
+      cells.push_back(held ? "" : significant(empirical, 2));
+    }
+    cells.push_back(tested ? fixed(ratio, 1) : "");
+    cells.push_back(prior == 0 ? "held" : std::isfinite(prior) ? "σ " + significant(prior, 2) : "free");
+    table.add(std::move(cells), tested && ratio < kSignificant ? "weak" : "");
   }
   return table.html();
 }

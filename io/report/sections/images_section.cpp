@@ -113,7 +113,7 @@ std::string images_section(const BlockResult& result, const Figures& f, const st
   std::string note =
       "Observations: number of kept ones; rejected: share of all observations in tracks. Positions are those of the "
       "projection centres in the ground frame";
-  note += columns.sigmas ? ", sigmas of the frame (rotation: the largest of three axes). " : ". ";
+  note += columns.sigmas ? ", formal sigmas of the frame (rotation: the largest of three axes). " : ". ";
   note += "Click a heading to sort.";
   if (all > static_cast<std::int64_t>(images.size()))
     note += fmt::format(

@@ -2,10 +2,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 
 #include "geometry/numbers/angles.h"
+#include "geometry/numbers/median.h"
 #include "io/block/held_priors.h"
 #include "io/report/drawing/drawing.h"
 #include "io/report/drawing/html.h"
@@ -130,6 +132,22 @@ std::string attitudes_section(const BlockResult& result, const Figures& f) {
 
 namespace {
 
+// The medians of the empirical sigmas of the oriented frames: east, north, up, rotation (largest axis); kUnknown where
+// they were not computed.
+std::array<double, 4> empirical_medians(const BlockResult& result) {
+  std::array<std::vector<double>, 4> sigmas;
+  const auto& covariances = result.empirical.frame_covariance;
+  for (FrameIndex f(0); covariances.contains(f); ++f.value) {
+    if (!result.state.oriented[f]) continue;
+    const PoseIncrement sigma = covariances[f].diagonal().cwiseMax(0).cwiseSqrt();
+    for (int k = 0; k < 3; ++k) sigmas[static_cast<std::size_t>(k)].push_back(sigma[3 + k]);
+    sigmas[3].push_back(sigma.head<3>().maxCoeff());
+  }
+  std::array<double, 4> medians;
+  for (std::size_t k = 0; k < 4; ++k) medians[k] = sigmas[k].empty() ? kUnknown : median(std::move(sigmas[k]));
+  return medians;
+}
+
 std::string about_datum(const BlockResult& result) {
   if (!result.gauge.starts_with("free")) return "";
   return " The datum is free: these are the sigmas after the similarity that fits the poses of all images best.";
@@ -146,16 +164,22 @@ std::string accuracy_section(const BlockResult& result, const Figures& f, const 
   for (const Spread* s : {&f.sigma_east, &f.sigma_north, &f.sigma_up, &f.point_sigma_horizontal, &f.point_sigma_up})
     if (std::isfinite(s->p95)) most = std::max(most, s->p95);
   const LengthUnit unit = length_unit(most);
-  Table table({"standard deviation", "median", "95 %", "largest", "median × σ₀"});
-  const auto add = [&](const std::string& name, const Spread& s, double factor) {
+  const std::array<double, 4> empirical = empirical_medians(result);
+  const bool both = std::isfinite(empirical[0]);
+  std::vector<std::string> headings{"formal sigma", "median", "95 %", "largest", "median × σ₀"};
+  if (both) headings.push_back("empirical sigma, median");
+  Table table(std::move(headings));
+  const auto add = [&](const std::string& name, const Spread& s, double factor, double other = kUnknown) {
     if (!std::isfinite(s.median)) return;
-    table.add({name, sigma_text(s.median * factor), sigma_text(s.p95 * factor), sigma_text(s.largest * factor),
-               sigma_text(s.median * scale * factor)});
+    std::vector<std::string> cells{name, sigma_text(s.median * factor), sigma_text(s.p95 * factor),
+                                   sigma_text(s.largest * factor), sigma_text(s.median * scale * factor)};
+    if (both) cells.push_back(std::isfinite(other) ? sigma_text(other * factor) : "");
+    table.add(std::move(cells));
   };
-  add(in_unit("frames, east", unit), f.sigma_east, unit.factor);
-  add(in_unit("frames, north", unit), f.sigma_north, unit.factor);
-  add(in_unit("frames, up", unit), f.sigma_up, unit.factor);
-  add("frames, rotation [°]", f.sigma_rotation, kDegreesPerRadian);
+  add(in_unit("frames, east", unit), f.sigma_east, unit.factor, empirical[0]);
+  add(in_unit("frames, north", unit), f.sigma_north, unit.factor, empirical[1]);
+  add(in_unit("frames, up", unit), f.sigma_up, unit.factor, empirical[2]);
+  add("frames, rotation [°]", f.sigma_rotation, kDegreesPerRadian, empirical[3]);
   add(in_unit("tie points, horizontal", unit), f.point_sigma_horizontal, unit.factor);
   add(in_unit("tie points, up", unit), f.point_sigma_up, unit.factor);
   return section(
@@ -163,7 +187,10 @@ std::string accuracy_section(const BlockResult& result, const Figures& f, const 
       paragraph(std::string("Standard deviations from the covariance of the whole block, ") +
                 (result.sigma_scaled ? "all multiplied by σ₀ a posteriori."
                                      : "for σ₀ = 1; only those of the last column are multiplied by σ₀ a posteriori.") +
-                " Rotation: the largest of the three axes." + about_datum(result)) +
+                " Rotation: the largest of the three axes." + about_datum(result) +
+                (both ? " Empirical sigmas follow from the residuals of neighbouring tie points, whose errors may be "
+                        "alike; the formal ones take all observations as independent."
+                      : "")) +
           table.html("compact") + ellipses_figure(result, f, after_reading));
 }
 

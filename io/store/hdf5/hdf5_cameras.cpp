@@ -6,8 +6,6 @@ namespace megablock {
 
 namespace {
 
-constexpr const char* kCovariance = "cameras/covariance";
-
 // Number of columns of a matrix of parameters; one if there is no camera.
 std::size_t columns_of(const std::vector<CameraModel>& models) {
   int most = 1;
@@ -74,21 +72,22 @@ std::vector<Intrinsics> get_intrinsics(const Hdf5Reader& file, std::int64_t rows
   return cameras;
 }
 
-void put_covariances(Hdf5Writer& file, const std::vector<Eigen::MatrixXd>& covariances) {
+void put_covariances(Hdf5Writer& file, const std::string& name, const std::vector<Eigen::MatrixXd>& covariances) {
   Eigen::Index size = 1;
   for (const Eigen::MatrixXd& c : covariances) size = std::max(size, c.rows());
   std::vector<double> values;
   for (const Eigen::MatrixXd& c : covariances)
     for (Eigen::Index i = 0; i < size; ++i)
       for (Eigen::Index j = 0; j < size; ++j) values.push_back(std::max(i, j) < c.rows() ? c(i, j) : kAbsent);
-  file.array(kCovariance, values, {static_cast<std::int64_t>(covariances.size()), size, size},
+  file.array(name, values, {static_cast<std::int64_t>(covariances.size()), size, size},
              {"", "posterior, of the parameters; held: 0"});
 }
 
-std::vector<Eigen::MatrixXd> get_covariances(const Hdf5Reader& file, const std::vector<CameraModel>& models) {
-  const std::size_t size = columns_in(file, kCovariance, models);
+std::vector<Eigen::MatrixXd> get_covariances(const Hdf5Reader& file, const std::string& name,
+                                             const std::vector<CameraModel>& models) {
+  const std::size_t size = columns_in(file, name, models);
   const auto n = static_cast<std::int64_t>(size);
-  const auto values = file.array<double>(kCovariance, {static_cast<std::int64_t>(models.size()), n, n});
+  const auto values = file.array<double>(name, {static_cast<std::int64_t>(models.size()), n, n});
   std::vector<Eigen::MatrixXd> covariances;
   for (std::size_t c = 0; c < models.size(); ++c) {
     const Eigen::Map<const Eigen::MatrixXd> padded(&values[c * size * size], n, n);

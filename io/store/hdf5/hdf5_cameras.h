@@ -35,8 +35,9 @@ void put_intrinsics(Hdf5Writer& file, const Cameras& cameras, const std::string&
 }
 std::vector<Intrinsics> get_intrinsics(const Hdf5Reader& file, std::int64_t rows = -1);
 
-// Covariances as an array [cameras x parameters x parameters].
-void put_covariances(Hdf5Writer& file, const std::vector<Eigen::MatrixXd>& covariances);
-std::vector<Eigen::MatrixXd> get_covariances(const Hdf5Reader& file, const std::vector<CameraModel>& models);
+// Covariances as an array [cameras x parameters x parameters], in the dataset `name`.
+void put_covariances(Hdf5Writer& file, const std::string& name, const std::vector<Eigen::MatrixXd>& covariances);
+std::vector<Eigen::MatrixXd> get_covariances(const Hdf5Reader& file, const std::string& name,
+                                             const std::vector<CameraModel>& models);
 
 }  // namespace megablock

@@ -100,7 +100,7 @@ TEST_F(EvaluateTest, HeldFramesHaveNoRatio) {
   const Evaluation e = evaluate(result_, simulated_.truth);
   EXPECT_TRUE(std::isnan(e.normalised_error_position) && std::isnan(e.normalised_error_position_interior));
   EXPECT_NEAR(e.normalised_error_rotation, 1, 0.04);
-  EXPECT_NE(to_text(e).find("error / stated sigma        position -, rotation 0.99"), std::string::npos) << to_text(e);
+  EXPECT_NE(to_text(e).find("error / formal sigma        position -, rotation 0.99"), std::string::npos) << to_text(e);
   const auto json = nlohmann::json::parse(to_json(e));
   EXPECT_TRUE(json["normalised_error_position"].is_null());
   EXPECT_TRUE(json["normalised_error_rotation"].is_number());

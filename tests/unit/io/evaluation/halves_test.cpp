@@ -42,6 +42,7 @@ class HalvesTest : public testing::Test {
       draw << random.normal3(), random.normal3();
       pose = pose_update(pose, root * draw);
       result.frame_covariance.push_back(share * share * root * root.transpose());
+      result.empirical.frame_covariance.push_back(root * root.transpose());
     }
     const int parameters = result.state.cameras[CameraIndex(0)].size();
     result.camera_covariance.push_back(Eigen::MatrixXd::Zero(parameters, parameters));
@@ -60,6 +61,7 @@ TEST_F(HalvesTest, TrueSigmasGiveOne) {
   // 1 800 numbers each: three sigmas are 0.05.
   EXPECT_NEAR(halves.positions.formal, 1, 0.05);
   EXPECT_NEAR(halves.rotations.formal, 1, 0.05);
+  EXPECT_NEAR(halves.positions.empirical, 1, 0.05);
   ASSERT_EQ(halves.cameras.size(), 1u);
   ASSERT_EQ(halves.cameras[0].each.size(), 1u);
   EXPECT_EQ(halves.cameras[0].each[0].name, "f");
@@ -88,6 +90,7 @@ TEST_F(HalvesTest, SigmasTooSmallShow) {
   const HalvesComparison halves = compare_halves(result(1, 0.5), result(2, 0.5));
   EXPECT_NEAR(halves.positions.formal, 2, 0.1);
   EXPECT_NEAR(halves.rotations.formal, 2, 0.1);
+  EXPECT_NEAR(halves.rotations.empirical, 1, 0.05);
 }
 
 // The second half in a datum of its own.

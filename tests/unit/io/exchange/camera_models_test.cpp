@@ -57,7 +57,7 @@ TEST(CameraModelFiles, WithoutRareParametersAreRead) {
   }
   const Hdf5Reader file(folder.path("old.h5"), "test");
   EXPECT_EQ(get_intrinsics(file, 1).front(), (Intrinsics{1400, 960, 540, -0.1, 0.02, 0.003, 1e-3, 2e-3, 0, 0}));
-  const Eigen::MatrixXd covariance = get_covariances(file, models).front();
+  const Eigen::MatrixXd covariance = get_covariances(file, "cameras/covariance", models).front();
   ASSERT_EQ(covariance.rows(), 10);
   EXPECT_EQ(covariance(7, 7), 0.5);
   EXPECT_EQ(covariance(8, 8), 0);

@@ -42,6 +42,9 @@ BlockResult example_result() {
   result.mount_covariance.push_back({BlockResult::Matrix6::Zero()});
   for (int f = 0; f < 4; ++f) result.aligned_covariance.push_back(symmetric<BlockResult::Matrix6>(f + 3));
   result.joint_covariance = {{FrameIndex(1), FrameIndex(3)}, symmetric<Eigen::Matrix<double, 12, 12>>(2)};
+  for (int f = 0; f < 4; ++f) result.empirical.frame_covariance.push_back(symmetric<BlockResult::Matrix6>(f + 7));
+  result.empirical.mount_covariance = result.mount_covariance;
+  result.empirical.camera_covariance = result.camera_covariance;
   result.tracks = example_tracks();
   result.points = {{1, 2, 3}, {nan, nan, nan}, {4, 5, 6}};
   result.point_covariance = {symmetric<Eigen::Matrix3d>(1), symmetric<Eigen::Matrix3d>(nan),
@@ -94,6 +97,10 @@ TEST(ResultFile, EverythingComesBack) {
   EXPECT_TRUE(back.aligned_covariance == result.aligned_covariance);
   EXPECT_EQ(back.joint_covariance.frames, result.joint_covariance.frames);
   EXPECT_EQ(back.joint_covariance.matrix, result.joint_covariance.matrix);
+  EXPECT_TRUE(back.empirical.frame_covariance == result.empirical.frame_covariance);
+  EXPECT_TRUE(back.empirical.aligned_covariance.empty());
+  EXPECT_TRUE(back.empirical.camera_covariance == result.empirical.camera_covariance);
+  EXPECT_EQ(back.empirical.mount_covariance, result.empirical.mount_covariance);
   EXPECT_EQ(back.boundary, result.boundary);
   EXPECT_EQ(back.tiles.tile_of_frame, result.tiles.tile_of_frame);
   EXPECT_EQ(back.tracks.id, result.tracks.id);

@@ -14,7 +14,7 @@
 namespace megablock {
 namespace {
 
-constexpr int kWidth = 2000, kHeight = 1500;  // pixels
+constexpr int kSensorWidth = 2000, kSensorHeight = 1500;  // pixels
 
 struct Scene {
   double focal_px = 1400;
@@ -49,7 +49,7 @@ PointPairs simulate(const Scene& scene, std::uint64_t seed) {
            scene.noise_px * Eigen::Vector2d(normal(random), normal(random));
   };
   const auto inside_image = [](const Eigen::Vector2d& p) {
-    return std::abs(p.x()) < 0.5 * kWidth && std::abs(p.y()) < 0.5 * kHeight;
+    return std::abs(p.x()) < 0.5 * kSensorWidth && std::abs(p.y()) < 0.5 * kSensorHeight;
   };
   PointPairs pairs;
   for (int tries = 0; pairs.size() < static_cast<std::size_t>(scene.matches) && tries < 200000; ++tries) {
@@ -60,7 +60,7 @@ PointPairs simulate(const Scene& scene, std::uint64_t seed) {
     const Eigen::Vector2d a = distorted(in_a);
     Eigen::Vector2d b = distorted(in_b);
     if (!inside_image(a) || !inside_image(b)) continue;
-    if (unit(random) + 0.5 < scene.wrong) b = {kWidth * unit(random), kHeight * unit(random)};
+    if (unit(random) + 0.5 < scene.wrong) b = {kSensorWidth * unit(random), kSensorHeight * unit(random)};
     pairs.a.push_back(a);
     pairs.b.push_back(b);
   }
@@ -75,7 +75,7 @@ std::optional<FocalLength> found_in(const Scene& scene, std::uint64_t seed, std:
   }
   FocalLengthOptions options;
   options.threads = threads;
-  return focal_length_of(pairs, kWidth, kHeight, options);
+  return focal_length_of(pairs, kSensorWidth, kSensorHeight, options);
 }
 
 // Within 2 %, and within four sigmas.
@@ -164,7 +164,7 @@ TEST(FocalLength, IsThatOfMostPairs) {
     scene.focal_px = i % 4 == 0 ? 2400 : 1400;
     pairs.push_back({simulate(scene, 500 + i), i});
   }
-  const auto found = focal_length_of(pairs, kWidth, kHeight);
+  const auto found = focal_length_of(pairs, kSensorWidth, kSensorHeight);
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->focal_px, 1400, 0.03 * 1400);
 }

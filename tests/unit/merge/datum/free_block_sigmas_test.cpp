@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "io/block/track_rows.h"
 #include "io/evaluation/evaluate.h"
 #include "io/evaluation/free_datum.h"
 #include "tests/support/merge/tiled_block.h"
@@ -20,6 +21,7 @@ struct Ratios {
     ++blocks;
   }
   void add(const Evaluation& e) { add(e.normalised_error_position, e.normalised_error_rotation); }
+  void add_empirical(const Evaluation& e) { add(e.empirical_error_position, e.empirical_error_rotation); }
   double of_positions() const { return std::sqrt(position / blocks); }
   double of_rotations() const { return std::sqrt(rotation / blocks); }
 };
@@ -34,6 +36,21 @@ SimulationOptions scene(std::uint64_t seed) {
   return options;
 }
 
+// Every track so many times, with the same errors.
+void repeat_tracks(int copies, SimulatedBlock& block) {
+  const TrackSet once = block.tracks;
+  const std::vector<Eigen::Vector3d> points = block.points;
+  block.tracks = {};
+  block.tracks.begin.push_back(0);
+  block.points.clear();
+  for (std::int64_t t = 0; t < once.track_count(); ++t)
+    for (int copy = 0; copy < copies; ++copy) {
+      append_tracks(once, t, t + 1, block.tracks);
+      block.tracks.id.back() = TrackIndex(std::ssize(block.points));
+      block.points.push_back(points[static_cast<std::size_t>(t)]);
+    }
+}
+
 BlockResult::JointCovariance joint_of(const CovarianceMatrix& frames) {
   BlockResult::JointCovariance joint;
   for (const Unknown& u : frames.unknowns) joint.frames.emplace_back(u.id.index);
@@ -42,13 +59,16 @@ BlockResult::JointCovariance joint_of(const CovarianceMatrix& frames) {
   return joint;
 }
 
-BlockResult adjusted(std::uint64_t seed, std::int64_t tile_max_frames) {
-  const TiledBlock block(simulate_block(scene(seed)), tile_max_frames, {}, 0);
+BlockResult adjusted(std::uint64_t seed, std::int64_t tile_max_frames, int copies = 1) {
+  SimulatedBlock simulated = simulate_block(scene(seed));
+  if (copies > 1) repeat_tracks(copies, simulated);
+  const TiledBlock block(std::move(simulated), tile_max_frames, {}, 0);
   MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   GlobalState state = start_global({});
   adjust_globally(runner, {}, state);
   EXPECT_EQ(state.outcome, GlobalOutcome::kConverged);
   runner.final_up();
+  runner.final_scores();
   BlockResult result;
   result.block = block.simulated.block;
   result.state = block.simulated.truth;
@@ -56,14 +76,18 @@ BlockResult adjusted(std::uint64_t seed, std::int64_t tile_max_frames) {
   const std::size_t frames = result.block.frames.size();
   result.frame_covariance.assign(frames, BlockResult::Matrix6::Zero());
   result.aligned_covariance = result.frame_covariance;
+  result.empirical.frame_covariance = result.empirical.aligned_covariance = result.frame_covariance;
   for (std::size_t t = 0; t < runner.problems().size(); ++t)
     for (std::size_t f = 0; f < runner.problems()[t].frames.size(); ++f) {
       const FrameIndex frame = runner.problems()[t].frames[f];
       result.state.frames[frame] = runner.states()[t].frames[f];
       result.frame_covariance[frame] = runner.covariances()[t].frames[f];
       result.aligned_covariance[frame] = runner.covariances()[t].aligned_frames[f];
+      result.empirical.frame_covariance[frame] = runner.empirical_covariances()[t].frames[f];
+      result.empirical.aligned_covariance[frame] = runner.empirical_covariances()[t].aligned_frames[f];
     }
   result.joint_covariance = joint_of(runner.frame_covariance());
+  result.empirical.joint_covariance = joint_of(runner.empirical_frame_covariance());
   return result;
 }
 
@@ -107,6 +131,30 @@ TEST(FreeBlockSigmas, AreThoseOfErrorsAfterAFit) {
     EXPECT_NEAR(ratios->of_rotations(), 1, 0.08);
     std::printf("error / sigma over %d blocks: position %.3f, rotation %.3f\n", ratios->blocks, ratios->of_positions(),
                 ratios->of_rotations());
+  }
+}
+
+// Errors that are independent, and errors that four tracks each have in common: the formal sigmas are then half of what
+// they should be.
+TEST(EmpiricalSigmas, AreTrueWhereNeighboursShareTheirErrors) {
+  for (const int copies : {1, 4}) {
+    Ratios formal, empirical, without_joint;
+    for (int seed = 1; seed <= kSeeds; ++seed) {
+      BlockResult result = adjusted(static_cast<std::uint64_t>(seed), seed % 2 == 0 ? 12 : 5, copies);
+      const BlockState truth = truth_of(static_cast<std::uint64_t>(seed));
+      const Evaluation e = evaluate(result, truth);
+      formal.add(e);
+      empirical.add_empirical(e);
+      result.joint_covariance = result.empirical.joint_covariance = {};
+      without_joint.add_empirical(evaluate(result, truth));
+    }
+    std::printf("%d copies: error / formal sigma %.3f, %.3f; / empirical sigma %.3f, %.3f\n", copies,
+                formal.of_positions(), formal.of_rotations(), empirical.of_positions(), empirical.of_rotations());
+    EXPECT_NEAR(formal.of_positions(), std::sqrt(copies), 0.08 * std::sqrt(copies));
+    EXPECT_NEAR(formal.of_rotations(), std::sqrt(copies), 0.08 * std::sqrt(copies));
+    EXPECT_NEAR(empirical.of_positions(), 1, 0.12);
+    EXPECT_NEAR(empirical.of_rotations(), 1, 0.12);
+    EXPECT_NEAR(without_joint.of_positions(), empirical.of_positions(), 1e-3);
   }
 }
 

@@ -1,0 +1,170 @@
+// The empirical covariances equal H^-1 B H^-1 of the dense system, with B from clusters that the test forms itself.
+#include "merge/tile/cluster_scores.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "geometry/numbers/decompositions.h"
+#include "merge/checks/monolithic.h"
+#include "tests/support/merge/tiled_block.h"
+
+namespace megablock {
+namespace {
+
+// The reduced system of one point: rows of J without the point, residuals of the scores.
+struct ReducedPoint {
+  Eigen::MatrixXd jacobian;
+  Eigen::VectorXd score;
+  std::int64_t redundancy = 0;
+};
+
+class DenseSystem {
+ public:
+  DenseSystem(const TileProblem& problem, const TileState& state)
+      : system_(monolithic_system(problem, state)), jacobian_(system_.jacobian), points_(problem.points.size()) {
+    const Eigen::Index u = system_.reduced_dimension;
+    std::vector<std::vector<Eigen::Index>> rows(points_.size());
+    std::vector<Eigen::Index> others;
+    for (Eigen::Index row = 0; row < jacobian_.rows(); ++row) {
+      bool found = false;
+      for (std::size_t p = 0; p < points_.size() && !found; ++p) {
+        const std::int64_t column = system_.point_column[p];
+        found = column >= 0 && (jacobian_.row(row).segment<3>(column).array() != 0).any();
+        if (found) rows[p].push_back(row);
+      }
+      if (!found) others.push_back(row);
+    }
+    normal_ = formal_ = jacobian_(others, Eigen::seqN(0, u)).transpose() * jacobian_(others, Eigen::seqN(0, u));
+    for (std::size_t p = 0; p < points_.size(); ++p) {
+      if (rows[p].empty()) continue;
+      const Eigen::MatrixXd by_point = jacobian_(rows[p], Eigen::seqN(system_.point_column[p], 3));
+      const Eigen::MatrixXd all = jacobian_(rows[p], Eigen::seqN(0, u));
+      const Eigen::MatrixXd projected =
+          all - by_point * solve_symmetric(by_point.transpose() * by_point, by_point.transpose() * all);
+      points_[p] = {projected, projected.transpose() * system_.residual(rows[p]), std::ssize(rows[p]) - 3};
+      normal_ += projected.transpose() * projected;
+    }
+    covariance_ = inverse(normal_);
+  }
+  const MonolithicSystem& system() const { return system_; }
+  const std::vector<ReducedPoint>& points() const { return points_; }
+  const Eigen::MatrixXd& covariance() const { return covariance_; }
+  const Eigen::MatrixXd& formal() const { return formal_; }  // of observations without a point
+
+ private:
+  MonolithicSystem system_;
+  Eigen::MatrixXd jacobian_;
+  std::vector<ReducedPoint> points_;
+  Eigen::MatrixXd normal_, formal_, covariance_;
+};
+
+TEST(ClusterScores, GiveTheSandwichOfTheDenseSystem) {
+  SimulationOptions options;
+  options.frames = 10;
+  options.points_per_frame = 80;
+  options.control_points = 3;
+  const TiledBlock block(simulate_block(options), 20, {}, 0);
+  ASSERT_EQ(block.tiles.tile_count, 1);
+  MergeInMemory runner(block.tiles.tree, block.problems, block.states);
+  GlobalState state = start_global({});
+  adjust_globally(runner, {}, state);
+  runner.final_up();
+  runner.final_scores();
+  const TileProblem& problem = runner.problems().front();
+  ASSERT_EQ(runner.tile_plans().front().points.size(), 1u) << "one cell";
+  const DenseSystem dense(problem, runner.states().front());
+
+  double extent = 0;
+  for (std::size_t o = 0; o < problem.kept.size(); ++o)
+    if (problem.kept[o]) extent = std::max({extent, problem.x[o], problem.y[o]});
+  Eigen::MatrixXd meat = dense.formal(), of_ties = Eigen::MatrixXd::Zero(meat.rows(), meat.cols()),
+                  normal_of_ties = of_ties;
+  struct Cluster {
+    Eigen::VectorXd score;
+    double leverage = 0;
+    std::int64_t rank = 0;
+    int points = 0;
+  };
+  std::map<std::tuple<int, int, int>, Cluster> clusters;
+  struct Image {
+    Eigen::VectorXd score;
+    Eigen::MatrixXd normal;
+  };
+  std::map<int, Image> images;
+  double squares = 0, uniform = 0;
+  for (std::size_t p = 0; p < problem.points.size(); ++p) {
+    const ReducedPoint& point = dense.points()[p];
+    if (point.redundancy <= 0) continue;
+    if (problem.points[p].role != PointRole::kTie) {
+      meat += point.jacobian.transpose() * point.jacobian;
+      continue;
+    }
+    const auto o = static_cast<std::size_t>(problem.begin[p]);  // all are kept
+    const auto field = [&](double pixel) { return static_cast<int>(pixel / (extent / 12)); };
+    Cluster& cluster = clusters[{problem.image[o].value, field(problem.x[o]), field(problem.y[o])}];
+    if (cluster.points++ == 0) cluster.score = Eigen::VectorXd::Zero(point.score.size());
+    cluster.score += point.score;
+    cluster.leverage += (point.jacobian * dense.covariance() * point.jacobian.transpose()).trace();
+    cluster.rank += point.redundancy;
+    Image& image = images[problem.image[o].value];
+    if (image.score.size() == 0) {
+      image.score = Eigen::VectorXd::Zero(point.score.size());
+      image.normal = Eigen::MatrixXd::Zero(point.score.size(), point.score.size());
+    }
+    image.score += point.score;
+    image.normal += point.jacobian.transpose() * point.jacobian;
+    normal_of_ties += point.jacobian.transpose() * point.jacobian;
+    if (p % 16 == 0) {
+      const Eigen::MatrixXd hat = point.jacobian * dense.covariance() * point.jacobian.transpose();
+      squares += hat.squaredNorm();
+      uniform += hat.trace() * hat.trace() / static_cast<double>(point.redundancy);
+    }
+  }
+  const ImageSpread& spread = runner.covariances().front().spread;
+  ImageSpread::Sum of_images, of_fields, of_camera;
+  const Eigen::MatrixXd& c = dense.covariance();
+  ASSERT_EQ(spread.cameras.size(), 1u);
+  const auto camera =
+      Eigen::seqN(dense.system().camera_column.at(0), runner.tile_plans().front().unknowns.back().dimension);
+  for (const auto& [number, image] : images) {
+    const Eigen::MatrixXd p = c * image.normal;
+    of_images.add({image.score.dot(c * image.score), p.trace() - (p * p).trace()});
+    const Eigen::MatrixXd own = inverse(c(camera, camera));
+    const Eigen::VectorXd change = (c * image.score)(camera);
+    of_camera.add({change.dot(own * change), (own * ((p - p * p) * c)(camera, camera)).trace()});
+  }
+  int shared = 0;
+  for (const auto& [key, cluster] : clusters) {
+    shared += cluster.points > 1;
+    const double rank = static_cast<double>(cluster.rank) / cluster.points;
+    const double share = squares / uniform * cluster.leverage / rank;
+    of_ties += cluster.score * cluster.score.transpose() / (1 - std::min(0.8, share));
+    of_fields.add({cluster.score.dot(c * cluster.score), cluster.leverage * (1 - std::min(0.8, share))});
+  }
+  EXPECT_GT(shared, 20);
+  EXPECT_EQ(images.size(), 9u);  // no track begins in the last image
+  EXPECT_NEAR(spread.images.squares, of_images.squares, 1e-6 * of_images.squares);
+  EXPECT_NEAR(spread.images.expected, of_images.expected, 1e-6 * of_images.expected);
+  EXPECT_NEAR(spread.fields.squares, of_fields.squares, 1e-6 * of_fields.squares);
+  EXPECT_NEAR(spread.fields.expected, of_fields.expected, 1e-4 * of_fields.expected);
+  EXPECT_NEAR(spread.cameras.begin()->second.squares, of_camera.squares, 1e-6 * of_camera.squares);
+  EXPECT_NEAR(spread.cameras.begin()->second.expected, of_camera.expected, 1e-6 * of_camera.expected);
+  const double inflation = std::max(1.0, of_images.ratio() / of_fields.ratio());
+  meat += 0.5 * inflation * (of_ties + of_fields.ratio() * normal_of_ties);
+  const Eigen::MatrixXd expected = dense.covariance() * meat * dense.covariance();
+  const TileCovariance& ours = runner.empirical_covariances().front();
+  for (std::size_t f = 0; f < problem.frames.size(); ++f) {
+    const Eigen::Index column = dense.system().frame_column[f];
+    const Eigen::MatrixXd own = expected.block<6, 6>(column, column);
+    const Eigen::VectorXd unit = own.diagonal().cwiseSqrt().cwiseInverse();
+    EXPECT_LE((unit.asDiagonal() * (ours.frames[f] - own) * unit.asDiagonal()).cwiseAbs().maxCoeff(), 0.01)
+        << f;  // h is stored in 1 / 32
+  }
+}
+
+}  // namespace
+}  // namespace megablock
