@@ -26,7 +26,9 @@ const std::map<std::string, Scene> kScenes = {{"aerial", Scene::kAerial},
                                               {"street", Scene::kStreet},
                                               {"stereopolis", Scene::kStereopolis},
                                               {"target-field", Scene::kTargetField},
-                                              {"panorama", Scene::kPanorama}};
+                                              {"panorama", Scene::kPanorama},
+                                              {"courtyard", Scene::kCourtyard},
+                                              {"tower", Scene::kTower}};
 const std::map<std::string, Path> kPaths = {{"single", Path::kSingle}, {"line", Path::kLine},
                                             {"loop", Path::kLoop},     {"s", Path::kS},
                                             {"all", Path::kAll},       {"sparse", Path::kSparse}};
@@ -49,9 +51,12 @@ const Effect kEverything, kTiePoints{{}, Effect::On::kTiePoints};
 const Effect kAerial{{"aerial"}}, kStereopolis{{"stereopolis"}}, kTargetField{{"target-field"}},
     kPanorama{{"panorama"}};
 const Effect kStreets{{"street", "stereopolis"}}, kTerrain{{"aerial", "street", "stereopolis"}};
+const Effect kFourSides{{"courtyard", "tower"}, Effect::On::kRendered};
 const Effect kVehicle{{"stereopolis", "target-field"}}, kRigs{{"street", "stereopolis", "target-field"}};
-const Effect kAnyCamera{{"aerial", "street", "panorama"}};  // the cameras of the vehicle are of one model
-const Effect kNoTrajectory{{"aerial", "street", "target-field", "panorama"}};  // position priors have white noise
+const Effect kAnyCamera{
+    {"aerial", "street", "panorama", "courtyard", "tower"}};  // the cameras of the vehicle are of one model
+const Effect kNoTrajectory{
+    {"aerial", "street", "target-field", "panorama", "courtyard", "tower"}};  // position priors have white noise
 
 // The options of the command line. An option that is not given has the default of the scene, which is known after
 // parsing. An option that is given without an effect is refused.
@@ -117,7 +122,7 @@ class SimulateOptions {
 
 void add_scene_options(SimulateOptions& s) {
   using O = SimulationOptions;
-  s.add("--frames", &O::frames, "Frames [100; stereopolis 800, target-field 30, panorama 42]");
+  s.add("--frames", &O::frames, "Frames [100; stereopolis 800, target-field 30, panorama 42, courtyard and tower 24]");
   s.add("--seed", &O::seed, "Seed [1]");
   s.add("--forward-overlap", &O::forward_overlap, "Aerial: along the row, 0..1 [0.8]", kAerial);
   s.add("--side-overlap", &O::side_overlap, "Aerial: between rows, 0..1 [0.6]", kAerial);
@@ -141,6 +146,8 @@ void add_scene_options(SimulateOptions& s) {
   s.add("--repeated-facades", &O::repeated_facades,
         "Street, stereopolis, rendered: share of houses with repeated facades, 0..1 [0]",
         {kStreets.scenes, Effect::On::kRendered});
+  s.add("--own-detail", &O::own_detail,
+        "Courtyard, tower: share of detail that each of the four like facades has of its own, 0..1 [0.4]", kFourSides);
   s.add("--mount-position-error", &O::mount_position_error_m,
         "Stereopolis, target-field: error and sigma of the given mounts, m [0.005]", kVehicle);
   s.add("--mount-rotation-error", &O::mount_rotation_error_deg, "The same of their rotations, degrees [0.5]", kVehicle);
@@ -153,18 +160,22 @@ void add_observation_options(SimulateOptions& s) {
   s.add("--mean-track", &O::mean_track, "Tie points: observations per point [5]", kTiePoints);
   s.add("--noise", &O::image_noise_px, "Image noise per axis, px [0.5]");
   s.add("--outliers", &O::outlier_share, "Tie points: share of outliers, 0..1 [0; stereopolis 0.03]", kTiePoints);
-  s.add("--width", &O::image_width, "Image width, px [1920]");
-  s.add("--image-height", &O::image_height, "Image height, px [1280; stereopolis, target-field 1080]");
-  s.add("--focal", &O::focal_px, "Focal length, px [1400]");
-  s.add("--camera-model", &O::camera_model, "Aerial, street, panorama: camera model, as in a project file [brown]",
-        kAnyCamera);
+  s.add("--width", &O::image_width, "Image width, px [1920; courtyard, tower 800]");
+  s.add("--image-height", &O::image_height,
+        "Image height, px [1280; stereopolis, target-field 1080, courtyard, tower 600]");
+  s.add("--focal", &O::focal_px, "Focal length, px [1400; courtyard, tower 640]");
+  s.add("--camera-model", &O::camera_model,
+        "All but stereopolis, target-field: camera model, as in a project file [brown]", kAnyCamera);
   s.add("--published-camera", &O::published_camera,
-        "Aerial, street, panorama: true camera of the published simulations, 1 to 4, with its size", kAnyCamera);
-  s.add("--start-focal", &O::start_focal,
-        "Aerial, street, panorama: focal length that the block starts from, over the nominal one [1]", kAnyCamera);
-  s.add("--affinity", &O::affinity,
-        "Aerial, street, panorama: largest affinity and skew of the true camera, share of the focal length [0]",
+        "All but stereopolis, target-field: true camera of the published simulations, 1 to 4, with its size",
         kAnyCamera);
+  s.add("--start-focal", &O::start_focal,
+        "All but stereopolis, target-field: focal length that the block starts from, over the nominal one [1]",
+        kAnyCamera);
+  s.add(
+      "--affinity", &O::affinity,
+      "All but stereopolis, target-field: largest affinity and skew of the true camera, share of the focal length [0]",
+      kAnyCamera);
   s.add_switch("--no-distortion", &O::distortion, "A camera without lens distortion");
   s.add_switch("--known-cameras", &O::free_cameras,
                "Stereopolis, target field: cameras are known and held at the truth, mounts are not", kVehicle);
@@ -173,7 +184,8 @@ void add_observation_options(SimulateOptions& s) {
 
 void add_prior_options(SimulateOptions& s) {
   using O = SimulationOptions;
-  s.add("--gps-sigma", &O::gps_sigma_m, "Position priors, m; 0 = none [0.05; stereopolis 0.02, target-field 0]");
+  s.add("--gps-sigma", &O::gps_sigma_m,
+        "Position priors, m; 0 = none [0.05; stereopolis 0.02, target-field, courtyard, tower 0]");
   s.add("--gps-share", &O::gps_share, "All but stereopolis: share of frames with a position prior [1]", kNoTrajectory);
   s.add("--masked-share", &O::gnss_masked_share, "Stereopolis: share of frames with masked satellites [0.5]",
         kStereopolis);

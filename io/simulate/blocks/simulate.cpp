@@ -2,6 +2,7 @@
 // streams of its own, so that an option of one part leaves the others as they are.
 #include "io/simulate/blocks/simulate.h"
 
+#include "io/base/error.h"
 #include "io/simulate/blocks/aerial.h"
 #include "io/simulate/blocks/control.h"
 #include "io/simulate/blocks/panorama.h"
@@ -10,6 +11,7 @@
 #include "io/simulate/blocks/street.h"
 #include "io/simulate/blocks/target_field.h"
 #include "io/simulate/blocks/tie_points.h"
+#include "io/simulate/scene/four_sides.h"
 #include "io/simulate/scene/trajectory.h"
 
 namespace megablock {
@@ -24,6 +26,10 @@ Layout make_layout(const SimulationOptions& options) {
       return make_stereopolis_layout(options);
     case SimulationOptions::Scene::kPanorama:
       return make_panorama_layout(options);
+    case SimulationOptions::Scene::kCourtyard:
+      return make_courtyard_layout(options);
+    case SimulationOptions::Scene::kTower:
+      return make_tower_layout(options);
     case SimulationOptions::Scene::kTargetField:
       break;
   }
@@ -41,6 +47,8 @@ SimulatedBlock simulate_block(const SimulationOptions& options, const TrackSink&
                               std::int64_t batch_observations) {
   options.check();
   Layout layout = make_layout(options);
+  if (!layout.scene)
+    throw InputError("simulation: courtyards and towers are made of rendered images only; add --rendered");
   // Without positions and control the job has nothing that ties it to the earth. A ground frame that claims this would
   // be wrong.
   layout.block.ground.georeferenced =

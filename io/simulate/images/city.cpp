@@ -14,6 +14,8 @@
 #include <limits>
 #include <numbers>
 
+#include "io/simulate/images/same_facade.h"
+#include "io/simulate/scene/four_sides.h"
 #include "io/simulate/streets/street_grid.h"
 
 namespace megablock {
@@ -22,6 +24,29 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kWindow = 1.7, kStorey = 3;  // metres, from one window to the next
+
+// The kind of surfaces of a scene, and the distance (metres) at which the finest wave of the texture is three pixels
+// long.
+struct Surroundings {
+  SimulationOptions::Scene scene;
+  City::Kind kind;
+  double sharp_m;
+};
+
+Surroundings surroundings(const SimulationOptions& options) {
+  using Scene = SimulationOptions::Scene;
+  for (const Surroundings& of : {Surroundings{Scene::kAerial, City::Kind::kTown, options.height_m},
+                                 Surroundings{Scene::kCourtyard, City::Kind::kCourtyard, 12},
+                                 Surroundings{Scene::kTower, City::Kind::kTower, 12}})
+    if (of.scene == options.scene) return of;
+  return {options.scene, City::Kind::kStreets, 8};
+}
+
+// Courtyards and towers stand on level ground.
+Terrain terrain_of(const SimulationOptions& options, City::Kind kind) {
+  if (kind == City::Kind::kStreets) return street_terrain(options);
+  return Terrain(options.seed, kind == City::Kind::kTown ? options.terrain_relief_m : 0, options.height_m);
+}
 
 }  // namespace
 
@@ -83,24 +108,36 @@ double HeightGrid::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3
 
 City::City(const SimulationOptions& options, const Layout& layout)
     : options_(options),
-      street_(options.scene != SimulationOptions::Scene::kAerial),
-      range_m_(street_ ? 60 : layout.scene->range_m()),
+      kind_(surroundings(options).kind),
+      level_(kind_ != Kind::kTown),
+      range_m_(level_ ? 60 : layout.scene->range_m()),
       intrinsics_(layout.truth.cameras.front()),
-      // The finest wave is three pixels long: 8 m away in streets, on the ground from the air.
-      texture_(options.seed, 3 * (street_ ? 8 : options.height_m) / options.focal_px) {
+      texture_(options.seed, 3 * surroundings(options).sharp_m / options.focal_px) {
   low_ = high_ = layout.truth.frames.front().centre.head<2>();
   for (const Pose& pose : layout.truth.frames) {
     low_ = low_.cwiseMin(pose.centre.head<2>());
     high_ = high_.cwiseMax(pose.centre.head<2>());
   }
-  const Eigen::Vector2d margin = Eigen::Vector2d::Constant(street_ ? 100 : range_m_);
+  const Eigen::Vector2d margin = Eigen::Vector2d::Constant(level_ ? 100 : range_m_);
   low_ -= margin;
   high_ += margin;
-  const Terrain terrain =
-      street_ ? street_terrain(options) : Terrain(options.seed, options.terrain_relief_m, options.height_m);
-  ground_ = HeightGrid(low_, high_, street_ ? 4 : 0.01 * options.height_m,
+  const Terrain terrain = terrain_of(options, kind_);
+  ground_ = HeightGrid(low_, high_, level_ ? 4 : 0.01 * options.height_m,
                        [&](double x, double y) { return terrain.height(x, y); });
-  street_ ? build_streets() : build_town();
+  switch (kind_) {
+    case Kind::kTown:
+      build_town();
+      break;
+    case Kind::kStreets:
+      build_streets();
+      break;
+    case Kind::kCourtyard:
+      build_courtyard();
+      break;
+    case Kind::kTower:
+      build_tower();
+      break;
+  }
   sort_boxes();
 }
 
@@ -170,9 +207,24 @@ void City::build_streets() {
   }
 }
 
+void City::build_courtyard() {
+  constexpr double kHalf = kCourtSide / 2, kDeep = 8, kHigh = 10;
+  // Four wings. Those in the south and north reach over the ends of the others.
+  for (const int side : {-1, 1}) {
+    const double near = side > 0 ? kHalf : -kHalf - kDeep;
+    add_box({-kHalf - kDeep, near}, {kHalf + kDeep, near + kDeep}, kHigh);
+    add_box({near, -kHalf}, {near + kDeep, kHalf}, kHigh);
+  }
+}
+
+void City::build_tower() {
+  constexpr double kHalf = kTowerSide / 2;
+  add_box({-kHalf, -kHalf}, {kHalf, kHalf}, 13);
+}
+
 void City::sort_boxes() {
   // About one box per cell.
-  cell_m_ = street_ ? kHouse : 0.3 * options_.height_m;
+  cell_m_ = level_ ? kHouse : 0.3 * options_.height_m;
   columns_ = static_cast<std::int64_t>((high_.x() - low_.x()) / cell_m_) + 1;
   rows_ = static_cast<std::int64_t>((high_.y() - low_.y()) / cell_m_) + 1;
   std::vector<std::vector<std::int64_t>> cells(static_cast<std::size_t>(columns_ * rows_));
@@ -290,47 +342,63 @@ Eigen::Vector3f City::colour(const Hit& hit, const Eigen::Vector3d& direction, d
   const double facing = std::max(0.1, -hit.normal.dot(direction));
   // The pixel covers d a across and d a / cos along the surface. Their geometric mean counts.
   const double footprint = hit.distance * pixel_angle / std::sqrt(facing);
-  const auto surface = static_cast<std::uint32_t>(hit.object + 2);
+  const bool four_sides = kind_ == Kind::kCourtyard || kind_ == Kind::kTower;
   Eigen::Vector3f base;
+  if (hit.object == kGround)
+    base = ground_colour(hit, footprint);
+  else if (four_sides && hit.normal.z() < 0.5)
+    base = same_facade_colour(texture_, {along_facade(hit.normal, p), p.z(), facade_side(hit.normal), footprint},
+                              options_.own_detail);
+  else
+    base = house_colour(hit, footprint);
+  return light(p, hit.normal) * base;
+}
+
+Eigen::Vector3f City::ground_colour(const Hit& hit, double footprint) const {
+  const Eigen::Vector3d& p = hit.point;
+  // The ground has large patches of grass and soil, with roads where nothing is built.
+  const double patch = level_ ? 7 : 0.12 * options_.height_m;
+  const float kind = Texture::cell(p.x() + 0.3 * p.y(), p.y() - 0.3 * p.x(), patch, 11);
+  Eigen::Vector3f base = kind < 0.3f   ? Eigen::Vector3f(104, 112, 72)
+                         : kind < 0.6f ? Eigen::Vector3f(128, 122, 94)
+                         : kind < 0.8f ? Eigen::Vector3f(112, 104, 92)
+                                       : Eigen::Vector3f(118, 116, 112);
+  if (level_) base = Eigen::Vector3f(112, 110, 108) + 0.15f * (base - Eigen::Vector3f(110, 110, 100));
+  // The paving of courtyards and about towers is smooth.
+  const float contrast = kind_ == Kind::kCourtyard || kind_ == Kind::kTower ? 0.12f : 0.5f;
+  const float detail = texture_.detail(p.x(), p.y(), 1, footprint);
+  return base * std::max(0.1f, 1 + contrast * detail);
+}
+
+Eigen::Vector3f City::house_colour(const Hit& hit, double footprint) const {
+  const Eigen::Vector3d& p = hit.point;
+  const std::uint32_t number = static_cast<std::uint32_t>(hit.object + 2) * 4;
+  // Random numbers of the house, not of the place on it.
+  const float tone = Texture::cell(0.5, 0.5, 1, number), hue = Texture::cell(1.5, 0.5, 1, number);
+  Eigen::Vector3f base(120 + 60 * tone, 105 + 50 * tone + 20 * hue, 90 + 60 * tone * hue + 20);
   float detail = 0;
-  if (hit.object == kGround) {
-    // The ground has large patches of grass and soil, with roads where nothing is built.
-    const double patch = street_ ? 7 : 0.12 * options_.height_m;
-    const float kind = Texture::cell(p.x() + 0.3 * p.y(), p.y() - 0.3 * p.x(), patch, 11);
-    base = kind < 0.3f   ? Eigen::Vector3f(104, 112, 72)
-           : kind < 0.6f ? Eigen::Vector3f(128, 122, 94)
-           : kind < 0.8f ? Eigen::Vector3f(112, 104, 92)
-                         : Eigen::Vector3f(118, 116, 112);
-    if (street_) base = Eigen::Vector3f(112, 110, 108) + 0.15f * (base - Eigen::Vector3f(110, 110, 100));
-    detail = texture_.detail(p.x(), p.y(), surface, footprint);
+  if (hit.normal.z() > 0.5) {
+    base = 0.8f * base + Eigen::Vector3f(30 * hue, 5, 0);
+    detail = texture_.detail(p.x(), p.y(), number, footprint);
   } else {
-    const std::uint32_t number = surface * 4;
-    // Random numbers of the house, not of the place on it.
-    const float tone = Texture::cell(0.5, 0.5, 1, number), hue = Texture::cell(1.5, 0.5, 1, number);
-    base = Eigen::Vector3f(120 + 60 * tone, 105 + 50 * tone + 20 * hue, 90 + 60 * tone * hue + 20);
-    if (hit.normal.z() > 0.5) {
-      base = 0.8f * base + Eigen::Vector3f(30 * hue, 5, 0);
-      detail = texture_.detail(p.x(), p.y(), number, footprint);
+    const int across = std::abs(hit.normal.x()) > 0.5 ? 0 : 1;
+    double along = p[1 - across], up = p.z();
+    const std::uint32_t wall = number + static_cast<std::uint32_t>(1 + across) + (hit.normal[across] > 0 ? 7 : 0);
+    if (Texture::cell(2.5, 0.5, 1, number) < options_.repeated_facades) {
+      // The same two windows repeat, each with its own traces of weather.
+      detail = 0.2f * texture_.detail(along, up, wall + 3, footprint);
+      along -= 2 * kWindow * std::floor(along / (2 * kWindow));
+      up -= kStorey * std::floor(up / kStorey);
+      detail += 0.9f * texture_.detail(along, up, wall, footprint);
     } else {
-      const int across = std::abs(hit.normal.x()) > 0.5 ? 0 : 1;
-      double along = p[1 - across], up = p.z();
-      const std::uint32_t wall = number + static_cast<std::uint32_t>(1 + across) + (hit.normal[across] > 0 ? 7 : 0);
-      if (Texture::cell(2.5, 0.5, 1, number) < options_.repeated_facades) {
-        // The same two windows repeat, each with its own traces of weather.
-        detail = 0.2f * texture_.detail(along, up, wall + 3, footprint);
-        along -= 2 * kWindow * std::floor(along / (2 * kWindow));
-        up -= kStorey * std::floor(up / kStorey);
-        detail += 0.9f * texture_.detail(along, up, wall, footprint);
-      } else {
-        detail = texture_.detail(along, up, wall, footprint);
-      }
-      // The windows have different brightness.
-      const double u = along / kWindow - std::floor(along / kWindow), v = up / kStorey - std::floor(up / kStorey);
-      if (u > 0.3 && u < 0.85 && v > 0.25 && v < 0.8)
-        base *= 0.3f + 0.7f * Texture::cell(along, up * kWindow / kStorey, kWindow, wall);
+      detail = texture_.detail(along, up, wall, footprint);
     }
+    // The windows have different brightness.
+    const double u = along / kWindow - std::floor(along / kWindow), v = up / kStorey - std::floor(up / kStorey);
+    if (u > 0.3 && u < 0.85 && v > 0.25 && v < 0.8)
+      base *= 0.3f + 0.7f * Texture::cell(along, up * kWindow / kStorey, kWindow, wall);
   }
-  return light(p, hit.normal) * (base * std::max(0.1f, 1 + 0.5f * detail));
+  return base * std::max(0.1f, 1 + 0.5f * detail);
 }
 
 float City::light(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
@@ -345,7 +413,7 @@ float City::light(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) c
 
 std::optional<SurfacePoint> City::sample(const Pose& frame, Random& random) const {
   Eigen::Vector3d direction;
-  if (street_) {
+  if (level_) {
     const double azimuth = random.uniform(0, 2 * std::numbers::pi), slope = random.uniform(-0.6, 0.3);
     // Streets are seen all around: from 31 degrees down to 17 degrees up.
     direction = Eigen::Vector3d(std::cos(azimuth), std::sin(azimuth), slope).normalized();
@@ -356,7 +424,7 @@ std::optional<SurfacePoint> City::sample(const Pose& frame, Random& random) cons
     direction = frame.rotation.conjugate() * *ray;
   }
   const Hit hit = cast(frame.centre, direction);
-  if (hit.object == kSky || hit.distance > (street_ ? 40 : 10 * options_.height_m)) return std::nullopt;
+  if (hit.object == kSky || hit.distance > (level_ ? 40 : 10 * options_.height_m)) return std::nullopt;
   return SurfacePoint{hit.point, hit.normal};
 }
 
@@ -364,7 +432,7 @@ bool City::visible(const Eigen::Vector3d& eye, const SurfacePoint& point) const 
   const Eigen::Vector3d sight = point.position - eye;
   const double distance = sight.norm();
   if (-sight.dot(point.normal) < 0.12 * distance) return false;
-  if (street_ && distance > range_m_) return false;
+  if (level_ && distance > range_m_) return false;
   // The tolerance is for the point itself, which lies on a surface with rounding errors.
   return cast(eye, sight / distance).distance > distance - 1e-3 * (1 + distance);
 }

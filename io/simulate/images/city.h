@@ -60,6 +60,9 @@ class City : public Scene {
     Eigen::Vector3d point = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();
   };
 
+  // Which surfaces a scene has (kKinds in city.cpp).
+  enum class Kind { kTown, kStreets, kCourtyard, kTower };
+
   City(const SimulationOptions& options, const Layout& layout);
 
   // `ground_guess` is the distance at which a neighbouring ray met the ground; 0 = unknown.
@@ -75,7 +78,7 @@ class City : public Scene {
     return SurfacePoint{{place.x(), place.y(), ground_.height(place.x(), place.y())}, Eigen::Vector3d::UnitZ()};
   }
   double range_m() const override { return range_m_; }
-  bool along_passes() const override { return street_; }
+  bool along_passes() const override { return kind_ == Kind::kStreets; }
 
   const std::vector<Box>& boxes() const { return boxes_; }
   const HeightGrid& ground() const { return ground_; }
@@ -83,6 +86,10 @@ class City : public Scene {
  private:
   void build_town();     // blocks of houses on a lattice
   void build_streets();  // houses along the streets of the street scene
+  void build_courtyard();
+  void build_tower();
+  Eigen::Vector3f ground_colour(const Hit& hit, double footprint) const;
+  Eigen::Vector3f house_colour(const Hit& hit, double footprint) const;
   void add_box(const Eigen::Vector2d& low, const Eigen::Vector2d& high, double height);
   void sort_boxes();
   // Finds the nearest box before `limit`. Returns its number (-1: none), its distance and the axis of the face.
@@ -90,7 +97,8 @@ class City : public Scene {
                            double& distance, int& axis) const;
 
   SimulationOptions options_;
-  bool street_;
+  Kind kind_;
+  bool level_;  // the cameras look along the ground, not down on it
   double range_m_;
   Intrinsics intrinsics_;
   Eigen::Vector2d low_, high_;  // extent in plan

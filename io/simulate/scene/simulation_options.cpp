@@ -30,6 +30,15 @@ SimulationOptions SimulationOptions::of(Scene scene, Path path) {
   options.scene = scene;
   options.path = path;
   if (scene == Scene::kAerial || scene == Scene::kStreet) return options;
+  if (scene == Scene::kCourtyard || scene == Scene::kTower) {
+    options.frames = 24;
+    options.image_width = 800;
+    options.image_height = 600;
+    options.focal_px = 640;
+    options.gps_sigma_m = 0;
+    options.start_position_error_m = -1;
+    return options;
+  }
   if (scene == Scene::kPanorama) {
     options.frames = 42;
     options.points_per_frame = 200;
@@ -113,6 +122,7 @@ void SimulationOptions::check() const {
   require_option(published_camera == 0 || !has_vehicle(scene),
                  "published_camera is not for scenes with the vehicle's rig");
   require_option(repeated_facades >= 0 && repeated_facades <= 1, "repeated_facades must lie in [0, 1]");
+  require_option(own_detail >= 0 && own_detail <= 1, "own_detail must lie in [0, 1]");
   require_option(!vehicle || scene == Scene::kStereopolis, "a vehicle is seen in the stereopolis scene only");
   require_option(points_per_frame >= 10 && points_per_frame <= kMostPoints, "points_per_frame must lie in [10, 1e6]");
   require_option(mean_track >= 2 && mean_track <= 30, "mean_track must lie in [2, 30]");

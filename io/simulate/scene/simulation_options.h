@@ -11,7 +11,15 @@
 namespace megablock {
 
 struct SimulationOptions {
-  enum class Scene { kAerial, kStreet, kStereopolis, kTargetField, kPanorama } scene = Scene::kAerial;
+  enum class Scene {
+    kAerial,
+    kStreet,
+    kStereopolis,
+    kTargetField,
+    kPanorama,
+    kCourtyard,
+    kTower
+  } scene = Scene::kAerial;
   // Target field: the path of the vehicle (docs/reference/simulate.md).
   enum class Path { kSingle, kLine, kLoop, kS, kAll, kSparse } path = Path::kS;
   // The defaults of a scene (and of a path on the target field). The initial values below are those of the aerial and
@@ -45,6 +53,8 @@ struct SimulationOptions {
   // Street, Stereopolis, rendered: share of the houses whose facades repeat every 3.4 m along the street and 3 m
   // upwards.
   double repeated_facades = 0;
+  // Courtyard, tower: the share of detail that each of the four like facades has of its own.
+  double own_detail = 0.4;
   // Stereopolis, target field: true and stated sigmas per axis of the given mounts; 0: held at the truth.
   double mount_position_error_m = 0.005, mount_rotation_error_deg = 0.5;
   // Panorama: the camera turns about a point (panorama_rotations()), and its projection centre is off_centre_m ahead of
