@@ -13,6 +13,7 @@
 #include "cluster/stages/pipeline/cameras.h"
 #include "cluster/stages/pipeline/candidates.h"
 #include "cluster/stages/pipeline/coverage.h"
+#include "cluster/stages/pipeline/false_pairs.h"
 #include "cluster/stages/pipeline/focal_lengths.h"
 #include "cluster/stages/pipeline/matching.h"
 #include "cluster/stages/pipeline/orientation.h"
@@ -43,6 +44,10 @@ void focal_lengths(const Stage& stage, const Job& job, JobRecord& record, StageR
 
 void matching(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
   results.matches = run_matching(stage, job, record, results.features, results.candidates);
+}
+
+void false_pairs(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
+  if (results.tie_points.empty()) results.matches = run_false_pairs(stage, job, record, results.matches);
   release_names(results.own);
   use_memory_sparingly();
 }
@@ -133,6 +138,14 @@ constexpr Stage kStages[] = {
      .kind = "matches",
      .read_file = [](const std::string& path) { read_matches(path); },
      .run = matching},
+    {.name = "false_pairs",
+     .needs = "features, matching, where most positions are unknown",
+     .makes = "false_pairs/<cell>.h5",
+     .unit = "cell of pairs",
+     .optional = true,
+     .kind = "matches",
+     .read_file = [](const std::string& path) { read_matches(path); },
+     .run = false_pairs},
     {.name = "tiles",
      .needs = "matching, or given tie points",
      .makes = "tiles.h5",
