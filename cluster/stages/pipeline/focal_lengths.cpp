@@ -33,6 +33,9 @@ constexpr std::size_t kFeatures = 3000;    // of an image, the coarsest
 constexpr double kShareAgainst = 0.15, kFewestAgainst = 4, kContradiction = 0.2;
 // It is also wrong where fewer pairs contradict it, but all together give another one, so many sigmas away.
 constexpr double kDoubts = 2, kSigmas = 3;
+// Where the pairs do not determine the focal length, one that is known must lie so many times outside of what they
+// allow: look-alike facades deceive some pairs by less.
+constexpr double kFarOutside = 2;
 constexpr double kMostSigma = 0.1;  // relative sigma of a focal length that the images determine
 constexpr double kKnown = 0.05;     // the same of one that counts as known
 // The usual focal length in larger sides of the image, and the distance in log f that it keeps from contradiction.
@@ -166,8 +169,11 @@ Finding judge(const FocalLength& found, const Camera& camera) {
   Finding finding{.against = found.against(before), .asked = found.asked};
   const bool determined = !found.open && found.sigma() <= kMostSigma;
   const double change = std::abs(std::log(found.focal_px / before));
-  const bool wrong = finding.against >= std::max(kFewestAgainst, kShareAgainst * found.asked) ||
-                     (determined && finding.against >= kDoubts && change >= kSigmas * found.sigma());
+  // How many times the focal length lies outside the interval.
+  const double outside = std::max(before / found.to_px, found.from_px / before);
+  const bool many = finding.against >= std::max(kFewestAgainst, kShareAgainst * found.asked),
+             clearly = finding.against >= kDoubts && change >= kSigmas * found.sigma();
+  const bool wrong = determined ? many || clearly : many && outside >= kFarOutside;
   if (wrong || (determined && !camera.focal_known)) {
     const double better = determined ? found.focal_px : usual_within(found, camera);
     if (camera.focal_known && std::abs(std::log(better / before)) < kContradiction) return finding;
