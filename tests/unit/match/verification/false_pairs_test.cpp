@@ -81,7 +81,9 @@ TEST_P(FalsePairsOfARing, AreFoundWithAWrongFocalLength) {
     const FalsePairs judged = find_false_pairs(made.pairs);
     std::int64_t found = 0;
     for (std::size_t p = 0; p < made.pairs.size(); ++p) {
-      if (!made.is_false[p]) EXPECT_EQ(judged.is_false[p], 0);
+      if (!made.is_false[p]) {
+        EXPECT_EQ(judged.is_false[p], 0);
+      }
       found += judged.is_false[p] && made.is_false[p];
     }
     EXPECT_GT(static_cast<double>(found), 0.6 * static_cast<double>(judged.is_false.size()) / 2);
