@@ -112,8 +112,7 @@ Camera make_camera(const std::string& name, const ImageHeader& header) {
   camera.height = header.height;
   const auto focal = focal_px(header);
   camera.focal_known = focal.has_value();
-  // Without any information a normal lens: 1.2 times the larger side is a field of view of 45 degrees.
-  camera.intrinsics[kFocal] = focal.value_or(1.2 * std::max(header.width, header.height));
+  camera.intrinsics[kFocal] = focal.value_or(usual_focal_px(header.width, header.height));
   camera.intrinsics[kPrincipalX] = header.width / 2.0;
   camera.intrinsics[kPrincipalY] = header.height / 2.0;
   camera.prior_sigma = default_intrinsic_sigmas(camera);

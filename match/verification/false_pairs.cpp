@@ -47,6 +47,11 @@ class MatchDensity {
   std::unordered_map<std::int64_t, int> count_;
 };
 
+Eigen::Quaterniond rotation_of(const PairOrientation& orientation) {
+  const auto& [w, x, y, z] = orientation.rotation_wxyz;
+  return Eigen::Quaterniond(w, x, y, z).normalized();
+}
+
 bool known(const PairEvidence& p) { return p.expected >= kFewestExpected; }
 double found_share(const PairEvidence& p) { return static_cast<double>(p.found) / static_cast<double>(p.expected); }
 
@@ -67,40 +72,14 @@ double sure_share(const PairEvidence& p) {
 // The spanning trees of the pairs with the largest shares: an image's way to its root.
 class ShareTree {
  public:
-  explicit ShareTree(const std::vector<PairEvidence>& pairs) : pairs_(pairs) {
+  explicit ShareTree(const std::vector<PairEvidence>& pairs) : in_tree(pairs.size(), 0), pairs_(pairs) {
     std::int64_t images = 0;
     for (const PairEvidence& p : pairs) images = std::max({images, p.a.value + 1, p.b.value + 1});
-    std::vector<std::size_t> order(pairs.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::size_t e, std::size_t f) { return sure_share(pairs[e]) > sure_share(pairs[f]); });
-    in_tree.assign(pairs.size(), 0);
-    DisjointSets sets(images);
-    std::vector<std::vector<std::size_t>> of_image(static_cast<std::size_t>(images));
-    for (const std::size_t e : order)
-      if (sets.unite(pairs[e].a.value, pairs[e].b.value)) {
-        in_tree[e] = 1;
-        for (const ImageIndex i : {pairs[e].a, pairs[e].b}) of_image[static_cast<std::size_t>(i.value)].push_back(e);
-      }
     nodes_.resize(static_cast<std::size_t>(images));
-    std::vector<std::uint8_t> done(nodes_.size(), 0);
-    for (std::size_t root = 0; root < nodes_.size(); ++root) {
-      if (done[root]) continue;
-      done[root] = 1;
-      std::vector<std::size_t> queue{root};
-      for (std::size_t next = 0; next < queue.size(); ++next) {
-        const std::size_t from = queue[next];
-        for (const std::size_t e : of_image[from]) {
-          const bool forward = static_cast<std::size_t>(pairs[e].a.value) == from;
-          const auto to = static_cast<std::size_t>((forward ? pairs[e].b : pairs[e].a).value);
-          if (done[to]) continue;
-          done[to] = 1;
-          const Eigen::Quaterniond turn = forward ? pairs[e].rotation : pairs[e].rotation.conjugate();
-          nodes_[to] = {(turn * nodes_[from].rotation).normalized(), from, e, nodes_[from].depth + 1};
-          queue.push_back(to);
-        }
-      }
-    }
+    const PairsOfImages links = choose_pairs();
+    std::vector<std::uint8_t> reached(nodes_.size(), 0);
+    for (std::size_t root = 0; root < nodes_.size(); ++root)
+      if (!reached[root]) grow_from(root, links, reached);
   }
 
   // How the tree relates the images of a pair: its error, and the pairs of the tree between them.
@@ -113,11 +92,16 @@ class ShareTree {
     auto a = static_cast<std::size_t>(pair.a.value), b = static_cast<std::size_t>(pair.b.value);
     Cycle cycle;
     cycle.error_rad = rotation_angle(nodes_[b].rotation, pair.rotation * nodes_[a].rotation);
+    if (pair.twin)
+      cycle.error_rad = std::min(cycle.error_rad, rotation_angle(nodes_[b].rotation, *pair.twin * nodes_[a].rotation));
     double lowest = 2;
     while (a != b) {
       std::size_t& deeper = nodes_[a].depth >= nodes_[b].depth ? a : b;
       const std::size_t e = nodes_[deeper].pair;
-      if (sure_share(pairs_[e]) < lowest) lowest = sure_share(pairs_[e]), cycle.lowest = e;
+      if (const double share = sure_share(pairs_[e]); share < lowest) {
+        lowest = share;
+        cycle.lowest = e;
+      }
       ++cycle.length;
       deeper = nodes_[deeper].parent;
     }
@@ -132,6 +116,42 @@ class ShareTree {
     std::size_t parent = 0, pair = 0;
     int depth = 0;
   };
+  using PairsOfImages = std::vector<std::vector<std::size_t>>;  // [images] rows of pairs
+
+  // The pairs with the largest sure shares that close no cycle.
+  PairsOfImages choose_pairs() {
+    std::vector<std::size_t> order(pairs_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t e, std::size_t f) { return sure_share(pairs_[e]) > sure_share(pairs_[f]); });
+    DisjointSets sets(std::ssize(nodes_));
+    PairsOfImages links(nodes_.size());
+    for (const std::size_t e : order) {
+      if (!sets.unite(pairs_[e].a.value, pairs_[e].b.value)) continue;
+      in_tree[e] = 1;
+      for (const ImageIndex i : {pairs_[e].a, pairs_[e].b}) links[static_cast<std::size_t>(i.value)].push_back(e);
+    }
+    return links;
+  }
+
+  // Gives the images that the tree joins to this root their ways to it.
+  void grow_from(std::size_t root, const PairsOfImages& links, std::vector<std::uint8_t>& reached) {
+    reached[root] = 1;
+    std::vector<std::size_t> queue{root};
+    for (std::size_t next = 0; next < queue.size(); ++next) {
+      const std::size_t from = queue[next];
+      for (const std::size_t e : links[from]) {
+        const bool forward = static_cast<std::size_t>(pairs_[e].a.value) == from;
+        const auto to = static_cast<std::size_t>((forward ? pairs_[e].b : pairs_[e].a).value);
+        if (reached[to]) continue;
+        reached[to] = 1;
+        const Eigen::Quaterniond turn = forward ? pairs_[e].rotation : pairs_[e].rotation.conjugate();
+        nodes_[to] = {(turn * nodes_[from].rotation).normalized(), from, e, nodes_[from].depth + 1};
+        queue.push_back(to);
+      }
+    }
+  }
+
   const std::vector<PairEvidence>& pairs_;
   std::vector<Node> nodes_;  // [images]
 };
@@ -157,8 +177,8 @@ std::vector<PairEvidence> evidence_of_pairs(const std::vector<VerifiedPair>& pai
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const VerifiedPair& pair = pairs[p];
-    const auto& wxyz = pair.rotation_wxyz;
-    result[p] = {pair.a, pair.b, Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).normalized(), 0, 0};
+    result[p] = {pair.a, pair.b, rotation_of(pair), 0, 0};
+    if (pair.twin) result[p].twin = rotation_of(*pair.twin);
     for (const auto& [image, rows] : {std::pair(pair.a, &pair.feature_a), std::pair(pair.b, &pair.feature_b)}) {
       const std::vector<Keypoint>& of = keypoints[image];
       const MatchDensity density(of, *rows, extent[image]);

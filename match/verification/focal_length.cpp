@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "geometry/estimation/ransac.h"
@@ -28,9 +29,9 @@ struct Sensor {
   double larger_side, half_diagonal;  // pixels
 };
 
-// Steps of q, and its range in steps: from cushions to barrels.
-constexpr double kBendStep = 0.05;
-constexpr int kFewestBends = -3, kMostBends = 10;
+// Steps of q, and its range in steps: from pincushion to barrel distortion.
+constexpr double kDistortionStep = 0.05;
+constexpr int kFewestSteps = -3, kMostSteps = 10;
 
 PointPairs scaled(const PointPairs& points, double factor) {
   PointPairs result = points;
@@ -39,8 +40,8 @@ PointPairs scaled(const PointPairs& points, double factor) {
   return result;
 }
 
-// Divides by the larger side, and straightens by q.
-PointPairs straightened(const PointPairs& pixels, double q, const Sensor& sensor) {
+// Corrects the distortion by q, and divides by the larger side.
+PointPairs corrected(const PointPairs& pixels, double q, const Sensor& sensor) {
   PointPairs result = pixels;
   for (auto* side : {&result.a, &result.b})
     for (Eigen::Vector2d& p : *side)
@@ -182,48 +183,57 @@ void find_least_contradicted(FocalLength& found) {
   found.focal_px = focal_at(static_cast<double>(k) + (k > 0 && k < last ? vertex(at(k - 1), at(k), at(k + 1)) : 0));
 }
 
-// The first pairs that have a fundamental matrix.
-std::vector<const MatchedImages*> usable_pairs(std::span<const MatchedImages> pairs, const Sensor& sensor,
-                                               const FocalLengthOptions& options) {
-  std::vector<std::uint8_t> usable(pairs.size());
-#pragma omp parallel for schedule(dynamic, 1) num_threads(options.threads)
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-    usable[i] = find_fundamental(straightened(pairs[i].pixels, 0, sensor), sensor.larger_side, pairs[i].seed, options)
-                    .has_value();
-  std::vector<const MatchedImages*> result;
-  for (std::size_t i = 0; i < pairs.size() && std::ssize(result) < options.max_pairs; ++i)
-    if (usable[i]) result.push_back(&pairs[i]);
-  return result;
-}
+using Pairs = std::vector<const MatchedImages*>;
 
-// The support that the fundamental matrices of all pairs have with q.
-double support_with(double q, const std::vector<const MatchedImages*>& pairs, const Sensor& sensor,
-                    const FocalLengthOptions& options) {
-  std::vector<double> support(pairs.size());
+// The support of the fundamental matrix of each pair after a correction by q; 0: there is none.
+std::vector<double> supports_with(double q, const Pairs& pairs, const Sensor& sensor,
+                                  const FocalLengthOptions& options) {
+  std::vector<double> supports(pairs.size());
 #pragma omp parallel for schedule(dynamic, 1) num_threads(options.threads)
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const PointPairs points = straightened(pairs[i]->pixels, q, sensor);
+    const PointPairs points = corrected(pairs[i]->pixels, q, sensor);
     const auto found = find_fundamental(points, sensor.larger_side, pairs[i]->seed, options);
-    support[i] = found ? found->consensus.score : 0;
+    supports[i] = found ? found->consensus.score : 0;
   }
-  return std::accumulate(support.begin(), support.end(), 0.0);
+  return supports;
 }
 
-// q with the largest support. It climbs from zero in equal steps; the support has one peak.
-double find_bend(const std::vector<const MatchedImages*>& pairs, const Sensor& sensor,
-                 const FocalLengthOptions& options) {
-  std::map<int, double> known;  // by number of steps
+double sum_of(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
+
+// The first max_pairs pairs that have a fundamental matrix, with the sum of their supports without a correction.
+std::pair<Pairs, double> usable_pairs(std::span<const MatchedImages> pairs, const Sensor& sensor,
+                                      const FocalLengthOptions& options) {
+  const auto most = static_cast<std::size_t>(options.max_pairs);
+  Pairs usable;
+  double sum = 0;
+  for (std::size_t first = 0; first < pairs.size() && usable.size() < most; first += most) {
+    Pairs next;
+    for (const MatchedImages& pair : pairs.subspan(first, std::min(most, pairs.size() - first))) next.push_back(&pair);
+    const std::vector<double> supports = supports_with(0, next, sensor, options);
+    for (std::size_t i = 0; i < next.size() && usable.size() < most; ++i) {
+      if (!(supports[i] > 0)) continue;
+      usable.push_back(next[i]);
+      sum += supports[i];
+    }
+  }
+  return {std::move(usable), sum};
+}
+
+// q with the largest support. It climbs from zero, with this support, in equal steps; the support has one peak.
+double find_distortion(const Pairs& pairs, double uncorrected, const Sensor& sensor,
+                       const FocalLengthOptions& options) {
+  std::map<int, double> known{{0, uncorrected}};  // by number of steps
   const auto support = [&](int steps) {
     const auto [place, is_new] = known.try_emplace(steps);
-    if (is_new) place->second = support_with(kBendStep * steps, pairs, sensor, options);
+    if (is_new) place->second = sum_of(supports_with(kDistortionStep * steps, pairs, sensor, options));
     return place->second;
   };
   int top = 0;
   for (const int direction : {1, -1})
-    while (top + direction >= kFewestBends && top + direction <= kMostBends && support(top + direction) > support(top))
+    while (top + direction >= kFewestSteps && top + direction <= kMostSteps && support(top + direction) > support(top))
       top += direction;
   const double shift = vertex(-support(top - 1), -support(top), -support(top + 1));
-  return kBendStep * (top + shift);
+  return kDistortionStep * (top + shift);
 }
 
 }  // namespace
@@ -232,18 +242,18 @@ void FocalLengthOptions::check() const {
   if (!(max_residual_px > 0)) throw std::invalid_argument("max_residual_px must be positive");
   if (!(min_ratio > 0 && max_ratio > min_ratio)) throw std::invalid_argument("0 < min_ratio < max_ratio is needed");
   if (min_inliers < 8 || min_pairs < 1 || max_pairs < min_pairs || threads < 1)
-    throw std::invalid_argument("at least 8 inliers, one pair, no more pairs at least than at most, one thread");
+    throw std::invalid_argument("min_inliers >= 8, 1 <= min_pairs <= max_pairs and threads >= 1 are needed");
 }
 
 std::optional<FocalLength> focal_length_of(std::span<const MatchedImages> pairs, int width, int height,
                                            const FocalLengthOptions& options) {
   options.check();
   const Sensor sensor{static_cast<double>(std::max(width, height)), 0.5 * std::hypot(width, height)};
-  const std::vector<const MatchedImages*> usable = usable_pairs(pairs, sensor, options);
+  const auto [usable, uncorrected] = usable_pairs(pairs, sensor, options);
   if (std::ssize(usable) < options.min_pairs) return std::nullopt;
-  const double q = find_bend(usable, sensor, options);
+  const double q = find_distortion(usable, uncorrected, sensor, options);
   FocalLength found;
-  found.straighten = q;
+  found.distortion = q;
   found.asked = static_cast<int>(usable.size());
   std::vector<double> focals;  // in larger sides
   for (double focal = options.min_ratio; focal <= options.max_ratio; focal *= std::exp(kGridStep))
@@ -251,7 +261,7 @@ std::optional<FocalLength> focal_length_of(std::span<const MatchedImages> pairs,
   std::vector<std::vector<double>> of_pairs(usable.size());
 #pragma omp parallel for schedule(dynamic, 1) num_threads(options.threads)
   for (std::size_t i = 0; i < usable.size(); ++i)
-    if (const auto inliers = inliers_of_fundamental(straightened(usable[i]->pixels, q, sensor), sensor.larger_side,
+    if (const auto inliers = inliers_of_fundamental(corrected(usable[i]->pixels, q, sensor), sensor.larger_side,
                                                     usable[i]->seed, options))
       of_pairs[i] = votes_of(*inliers, focals);
   found.votes.assign(focals.size(), 0);

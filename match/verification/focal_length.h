@@ -22,12 +22,12 @@
 // length is wrong where many more pairs contradict it.
 //
 // Lens distortion would pass for another focal length: 8 % in the corners move it by 18 %. So it is found first, from F
-// alone, for all pairs of the camera together. Distorted image points x at the radius r from the principal point are
-// straightened by
+// alone, for all pairs of the camera together. The correction of an image point x at the radius r from the principal
+// point is
 //
 //     x (1 + q r^2 / R^2)                                    (R: half the diagonal of the image),
 //
-// and q is where the fundamental matrices have most support. The pairs then tell f from straightened points.
+// and q is where the fundamental matrices have most support. The pairs then tell f from corrected points.
 #pragma once
 
 #include <cstdint>
@@ -60,7 +60,7 @@ struct FocalLength {
   // The interval; its ends may be those of the range of focal lengths, min_ratio and max_ratio.
   double from_px = 0, to_px = 0;
   bool open = false;                   // the interval reaches an end of the range
-  double straighten = 0;               // q of the head of this file
+  double distortion = 0;               // q of the head of this file
   int asked = 0;                       // pairs that have enough inliers, at most max_pairs
   std::vector<double> grid_px, votes;  // the votes against each focal length of the grid
 

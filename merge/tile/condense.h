@@ -168,8 +168,8 @@ struct TileCovariance {
   std::vector<float> redundancy_x, redundancy_y;
   // tr P^2 over (tr P)^2 / r of single tie points, P their hat matrix of rank r (cluster_scores.h): 1 where all
   // directions take part alike. From a sample of the points.
-  double concentration = 1;
-  ImageSpread spread;  // where asked for
+  double concentration = 1;  // both where TileDatum::spread asks for them
+  ImageSpread spread;
   // [points] The further columns (3 x columns), where they were asked for.
   std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> point_columns;
 };

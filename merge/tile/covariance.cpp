@@ -81,7 +81,7 @@ class CellCovariances {
       for (std::size_t i = 0; i < equations_.points().size(); ++i) {
         equations_.blocks(i, blocks_);
         add_point(i);
-        if (equations_.points()[i].point % kSampled == 0) add_concentration(i, statistics);
+        if (images_ && equations_.points()[i].point % kSampled == 0) add_concentration(i, statistics);
         if (columns_.columns > 1) add_point_columns(i);
         if (images_) images_->add_point(equations_, i, leverage(equations_.points()[i]));
       }

@@ -79,7 +79,7 @@ void MergeInMemory::final_scores() {
         change(empirical.points, of_scores.points);
       });
   for (std::size_t i = 0; i < scored.matrix.size(); ++i)
-    empirical_frames_.matrix[i] = (empirical_frames_.matrix[i] - scored.matrix[i]) / kScoreWeight;
+    empirical_frames_.matrix[i] = empirical_covariance(empirical_frames_.matrix[i], scored.matrix[i]);
 }
 
 const std::vector<TileStep>& MergeInMemory::steps() const {

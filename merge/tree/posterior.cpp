@@ -80,8 +80,8 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
       },
       [&](const RankTile& tile, const TileCovariance& covariance) {
         tables[last] = covariance.observations;
-        cluster_weights_[last] = cluster_weights(tile.problem, covariance);
         spreads[last] = covariance.spread;
+        if (scores_expected_) cluster_weights_[last] = cluster_weights(tile.problem, covariance);
         if (visit) visit(tile, covariance);
       });
   check_seams_ = false;

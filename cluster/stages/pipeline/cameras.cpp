@@ -115,9 +115,8 @@ void take_choices(const std::string& path, Block& block, BlockState& state) {
     Camera& camera = block.cameras[CameraIndex(number)];
     if (choice.focal_contradicted) {
       camera.focal_known = false;
-      choice.reason =
-          fmt::format("the focal length of {:.0f} px is contradicted by the images, its prior is loosened; {}",
-                      camera.intrinsics[kFocal], choice.reason);
+      choice.reason = fmt::format("the images contradict the focal length of {:.0f} px, which becomes a guess; {}",
+                                  camera.intrinsics[kFocal], choice.reason);
     }
     camera.prior_sigma = default_intrinsic_sigmas(camera, choice.estimated);
     camera.choice = choice.reason;

@@ -97,10 +97,10 @@ std::vector<std::string> run_false_pairs(const Stage& stage, const Job& job, Job
     if (!job.store.seal(names[c])) names[c] = matches[c];  // failed, and recorded so
   add_note(
       job, record, stage.name,
-      fmt::format("{} of {} pairs of images are left out: their images look alike, but show different things, such "
-                  "as two sides of one building: {}; the rotations of these pairs contradict those of pairs that "
-                  "have more in common; the block may still be torn between such images: look at their places in the "
-                  "report, and add images that show two sides at once, or positions",
+      fmt::format("{} of {} pairs of images are left out, because their rotations contradict those of pairs that have "
+                  "more in common: {}; such images may look alike and show different things, as two sides of one "
+                  "building; the block may be torn between them: look at their places in the report, and add images "
+                  "that show two sides at once, or positions",
                   judged.count(), pairs.size(), examples(job.block, pairs, judged)));
   return names;
 }

@@ -38,8 +38,7 @@ constexpr double kDoubts = 2, kSigmas = 3;
 constexpr double kFarOutside = 2;
 constexpr double kMostSigma = 0.1;  // relative sigma of a focal length that the images determine
 constexpr double kKnown = 0.05;     // the same of one that counts as known
-// The usual focal length in larger sides of the image, and the distance in log f that it keeps from contradiction.
-constexpr double kUsual = 1.2, kInset = 0.2;
+constexpr double kInset = 0.2;      // distance in log f that the usual focal length keeps from contradiction
 
 // Whether the stage estimates the focal length of a camera: one that leaves its parameters to the block, and whose lens
 // draws straight lines as far as is known.
@@ -86,9 +85,13 @@ PairsByCamera pairs_to_ask(const Job& job, const CandidateGraph& graph) {
   std::map<CameraIndex, ImageIndex> last;  // of the first kImages images
   for (CameraIndex c(0); block.cameras.contains(c); ++c.value)
     if (asks(block.cameras[c])) all[c];
+  if (all.empty()) return all;
   for (ImageIndex i(0); block.images.contains(i); ++i.value)
     if (const CameraIndex c = block.camera_of(i); all.contains(c) && images[c]++ < kImages) last[c] = i;
+  ImageIndex furthest(-1);
+  for (const auto& [camera, image] : last) furthest = std::max(furthest, image);
   for (const ImagePair& pair : graph.pairs) {
+    if (pair.a > furthest) break;  // the pairs are ascending
     const CameraIndex c = block.camera_of(pair.a);
     if (all.contains(c) && block.camera_of(pair.b) == c && pair.b <= last[c]) all[c].push_back(pair);
   }
@@ -151,8 +154,8 @@ std::optional<FocalLength> estimate(const Job& job, const Camera& camera, const 
 
 // What the stage says of a camera.
 struct Finding {
-  double focal_px = 0;  // 0: the camera keeps its focal length
-  double sigma = 0;     // relative; 0: not determined
+  double focal_px = 0;  // with which the block starts; 0: the camera keeps its own
+  double sigma = 0;     // relative; 0: the pairs only limit the focal length
   double against = 0;   // number of pairs that contradict the focal length of the camera
   int asked = 0;
 };
@@ -160,8 +163,8 @@ struct Finding {
 // A point of the interval near the usual focal length, but away from the ends, where pairs begin to contradict.
 double usual_within(const FocalLength& found, const Camera& camera) {
   const double inset = std::min(kInset, 0.5 * std::log(found.to_px / found.from_px));
-  const double usual = kUsual * std::max(camera.width, camera.height);
-  return std::clamp(usual, found.from_px * std::exp(inset), found.to_px * std::exp(-inset));
+  return std::clamp(usual_focal_px(camera.width, camera.height), found.from_px * std::exp(inset),
+                    found.to_px * std::exp(-inset));
 }
 
 Finding judge(const FocalLength& found, const Camera& camera) {
@@ -207,9 +210,10 @@ std::string take(const Finding& finding, Camera& camera) {
   if (!(finding.focal_px > 0)) return "";
   const double before = camera.intrinsics[kFocal];
   const std::string found =
-      finding.sigma > 0 ? fmt::format("{} +- {:.1f} % by {} pairs of images", text_of(camera, finding.focal_px),
-                                      100 * finding.sigma, finding.asked)
-                        : fmt::format("about {}, which few of them contradict", text_of(camera, finding.focal_px));
+      finding.sigma > 0
+          ? fmt::format("{} +- {:.1f} % by {} pairs of images", text_of(camera, finding.focal_px), 100 * finding.sigma,
+                        finding.asked)
+          : fmt::format("about {}, which few pairs of images contradict", text_of(camera, finding.focal_px));
   const std::string note =
       camera.focal_known
           ? fmt::format(

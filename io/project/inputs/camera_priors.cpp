@@ -1,6 +1,10 @@
 #include "io/project/inputs/camera_priors.h"
 
+#include <algorithm>
+
 namespace megablock {
+
+double usual_focal_px(int width, int height) { return 1.2 * std::max(width, height); }
 
 IntrinsicSigmas default_intrinsic_sigmas(const Camera& camera) {
   return default_intrinsic_sigmas(camera, usual_parameters(camera.intrinsics.model()));

@@ -57,6 +57,19 @@ TEST(DeterminedParameters, OfPixelsThatAreNotSquare) {
     }
 }
 
+// Positions and relief determine the focal length of the block; its prior allows 5 %.
+TEST(DeterminedParameters, SayWhereAKnownFocalLengthIsContradicted) {
+  for (const double start : {1.0, 0.7, 1.3}) {
+    SimulatedBlock simulated = simulate_block(aerial(30));
+    Camera& camera = simulated.block.cameras[CameraIndex(0)];
+    camera.intrinsics[kFocal] = start * simulated.truth.cameras[CameraIndex(0)][kFocal];
+    camera.focal_known = true;
+    EXPECT_EQ(choice_of(simulated).focal_contradicted, start != 1) << start;
+    camera.focal_known = false;
+    EXPECT_FALSE(choice_of(simulated).focal_contradicted) << "of a guess: " << start;
+  }
+}
+
 // Each image has an error of its own that looks like an affinity and a decentring. The normal equations see many
 // sigmas.
 TEST(DeterminedParameters, AreNotThoseOfErrorsOfSingleImages) {
