@@ -51,6 +51,7 @@ const Effect kEverything, kTiePoints{{}, Effect::On::kTiePoints};
 const Effect kAerial{{"aerial"}}, kStereopolis{{"stereopolis"}}, kTargetField{{"target-field"}},
     kPanorama{{"panorama"}};
 const Effect kStreets{{"street", "stereopolis"}}, kTerrain{{"aerial", "street", "stereopolis"}};
+const Effect kMoving{{"aerial", "street"}, Effect::On::kTiePoints};
 const Effect kFourSides{{"courtyard", "tower"}, Effect::On::kRendered};
 const Effect kVehicle{{"stereopolis", "target-field"}}, kRigs{{"street", "stereopolis", "target-field"}};
 const Effect kAnyCamera{
@@ -176,6 +177,11 @@ void add_observation_options(SimulateOptions& s) {
       "--affinity", &O::affinity,
       "All but stereopolis, target-field: largest affinity and skew of the true camera, share of the focal length [0]",
       kAnyCamera);
+  s.add("--readout-ms", &O::readout_ms,
+        "Aerial, street, tie points: rolling shutter, time from the first row to the last, ms; 0 = none [0]", kMoving);
+  s.add("--start-readout", &O::start_readout, "Of it: readout time that the block states, over the true one [1]",
+        kMoving);
+  s.add("--speed", &O::speed_mps, "Of it: speed, m/s [10]", kMoving);
   s.add_switch("--no-distortion", &O::distortion, "A camera without lens distortion");
   s.add_switch("--known-cameras", &O::free_cameras,
                "Stereopolis, target field: cameras are known and held at the truth, mounts are not", kVehicle);

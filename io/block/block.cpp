@@ -115,6 +115,8 @@ void check(const Block& block) {
     require(camera.intrinsics[kFocal] > 0, "camera '" + camera.name + "': focal length must be positive (pixels)");
     require(std::all_of(camera.intrinsics.begin(), camera.intrinsics.end(), [](double v) { return std::isfinite(v); }),
             "camera '" + camera.name + "': a parameter is not a finite number");
+    require(std::abs(camera.readout_s) <= kLongestReadoutS,
+            "camera '" + camera.name + "': the readout time of an image must be at most 1 s");
     for (double sigma : camera.prior_sigma)
       // Infinity is allowed and means a free parameter; the comparison also refuses NaN.
       require(sigma >= 0, "camera '" + camera.name + "': a prior sigma is negative or not a number");

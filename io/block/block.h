@@ -37,10 +37,16 @@ struct Camera {
   // From EXIF, the sensor table or the project file; false: a guess (1.2 times the larger side).
   bool focal_known = false;
   std::string mask_path;  // PNG, black = ignore; empty = no mask
+  // Time from the first row of an image to the last, seconds; 0: all rows are exposed at once, negative: the last row
+  // comes first (geometry/camera/rolling_shutter.h).
+  double readout_s = 0;
+  bool estimate_readout = false;  // the images tell it, and must confirm what is given, unless that is 0
   // Whether the block decides which parameters are estimated, and what it decided, for the report.
   bool choose = false;
   std::string choice;
 };
+
+inline constexpr double kLongestReadoutS = 1;  // of Camera::readout_s
 
 // Pose of a camera in its rig. A single camera is a rig of one camera with the identity as its mount, held fixed.
 struct Mount {

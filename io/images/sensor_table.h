@@ -1,11 +1,7 @@
 // Looks up the sensor widths of well-known cameras. They turn a focal length in millimetres into one in pixels.
 //
-// The table (sensor_widths.csv, about 3 800 cameras) joins makers' data sheets with the public table of COLMAP; its
-// head states the sources and licences, and make_sensor_widths.py makes it. Programs write the same camera with other
-// spaces, hyphens and capitals, so only letters and digits are compared.
-//
-// A line of the table is "make,model,width_mm" with plain names (letters and digits in lower case); an empty make
-// stands for any. The model is looked up first, then with the name of its maker taken off.
+// The table (sensor_widths.csv, about 3 800 cameras; camera_table.h) joins makers' data sheets with the public table of
+// COLMAP; its head states the sources and licences, and make_sensor_widths.py makes it.
 #pragma once
 
 #include <optional>

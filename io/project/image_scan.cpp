@@ -10,6 +10,7 @@
 #include "geometry/numbers/median.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
+#include "io/images/readout_table.h"
 #include "io/project/inputs/camera_priors.h"
 
 namespace megablock {
@@ -117,6 +118,8 @@ Camera make_camera(const std::string& name, const ImageHeader& header) {
   camera.intrinsics[kPrincipalY] = header.height / 2.0;
   camera.prior_sigma = default_intrinsic_sigmas(camera);
   camera.choose = true;
+  camera.readout_s = readout_time_s(header.make, header.model, 1e-6 * header.width * header.height).value_or(0);
+  camera.estimate_readout = camera.readout_s != 0;
   return camera;
 }
 

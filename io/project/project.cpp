@@ -179,6 +179,7 @@ Project read_project(const std::string& path, const std::vector<SettingsSection>
     throw InputError(project.file + ": " + error.what());
   }
   warn_of_distant_places(project);
+  warn_of_unknown_motion(project);
   return project;
 }
 

@@ -108,8 +108,22 @@ void read_intrinsics(YamlReader& reader, Camera& camera) {
 
 namespace {
 
+// `auto` is what the table of cameras says, if the images confirm it.
+void read_readout(YamlReader& reader, Camera& camera) {
+  const auto text = reader.text("readout_ms");
+  if (!text || *text == "auto") return;
+  camera.estimate_readout = *text == "estimate";
+  camera.readout_s = 0;
+  if (camera.estimate_readout) return;
+  const double ms =
+      parse_number(*text, "readout_ms, which is 'auto', 'estimate' or a number,", reader.where("readout_ms"));
+  check_within(ms, {-1000 * kLongestReadoutS, 1000 * kLongestReadoutS}, "readout_ms", reader.where("readout_ms"));
+  camera.readout_s = ms / 1000;
+}
+
 void read_values(YamlReader& reader, bool image_files, Camera& camera) {
   read_intrinsics(reader, camera);
+  read_readout(reader, camera);
   if (const auto mask = reader.existing_file("mask")) {
     if (!image_files) refuse_unused(reader, "mask", kNoImageFiles);
     camera.mask_path = *mask;
@@ -134,12 +148,17 @@ void read_calibrate(YamlReader& reader, Camera& camera) {
 void read_camera(YamlReader& cameras, bool image_files, Camera& camera) {
   auto common = cameras.mapping("default"), own = cameras.mapping(camera.name);
   if (!common && !own) return;
-  if (common) read_values(*common, image_files, camera);
-  if (own) read_values(*own, image_files, camera);
-  // After the values, because the sigmas depend on the focal length and on whether it is known.
-  camera.prior_sigma = default_intrinsic_sigmas(camera);
   const auto has_calibrate = [](auto& section) { return section && section->node("calibrate"); };
   const bool for_all = has_calibrate(common), for_this = has_calibrate(own);  // asks both, so that both know the key
+  const auto only_readout = [](auto& section) {
+    return !section || section->keys() == std::vector<std::string>{"readout_ms"};
+  };
+  const bool keeps_sigmas = only_readout(common) && only_readout(own);
+  if (common) read_values(*common, image_files, camera);
+  if (own) read_values(*own, image_files, camera);
+  // After the values, because the sigmas depend on the focal length and on whether it is known. A readout time says
+  // nothing of them.
+  if (!keeps_sigmas) camera.prior_sigma = default_intrinsic_sigmas(camera);
   if (for_this)
     read_calibrate(*own, camera);
   else if (for_all)

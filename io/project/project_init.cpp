@@ -108,6 +108,9 @@ std::string found_text(const Project& project) {
     std::snprintf(line, sizeof line, "  #   focal_px: %.1f  # %s\n", camera.intrinsics[kFocal],
                   camera.focal_known ? "from the image headers" : "a guess: 1.2 x the larger side");
     text << "  # " << quoted(camera.name) << ":\n" << line;
+    if (camera.readout_s != 0)
+      text << "  #   readout_ms: auto  # rolling shutter of " << 1000 * camera.readout_s
+           << " ms by a table of cameras, if the images confirm it\n";
   }
   for (const std::string& line : project.found) text << "# " << line << "\n";
   const GroundFrame& ground = project.block.ground;

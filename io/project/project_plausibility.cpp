@@ -1,5 +1,5 @@
-// Warns of places that are too far from the images to be right: coordinates were exchanged, or belong to another
-// coordinate system.
+// Warns of places that are too far from the images to be right (coordinates were exchanged, or belong to another
+// coordinate system), and of rolling shutters that cannot be corrected.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -67,6 +67,23 @@ void warn_of_distant_places(Project& project) {
     if (distance > extent)
       project.warnings.push_back("control point '" + point.name + "' lies " + kilometres(distance) +
                                  " from the images" + remedy);
+  }
+}
+
+void warn_of_unknown_motion(Project& project) {
+  const Block& block = project.block;
+  IndexedVector<CameraIndex, std::uint8_t> timed(block.cameras.size(), std::uint8_t{0});
+  for (const Frame& frame : block.frames)
+    for (const Mount& mount : block.rigs[frame.rig].mounts)
+      if (std::isfinite(frame.time_s)) timed[mount.camera] = 1;
+  for (CameraIndex c(0); block.cameras.contains(c); ++c.value) {
+    const Camera& camera = block.cameras[c];
+    // Nobody asked for what a table of cameras says; the stage that asks the images tells what became of it.
+    const bool asked_for = (camera.readout_s != 0) != camera.estimate_readout;
+    if (timed[c] || !asked_for) continue;
+    project.warnings.push_back("camera '" + camera.name +
+                               "' has a rolling shutter (readout_ms), but its images have no times; their motion is "
+                               "not known and is not corrected");
   }
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "adjust/calibration/rig_observations.h"
+#include "adjust/tile/rolling_start.h"
 #include "io/base/error.h"
 #include "io/project/inputs/camera_priors.h"
 #include "merge/tree/tile_solver.h"
@@ -16,15 +17,18 @@ namespace {
 class Determination {
  public:
   Determination(const Block& block, const BlockState& state, const TrackSet& tracks,
-                const std::vector<CameraIndex>& cameras, const AdjustOptions& adjustment,
-                const ParameterChoiceOptions& options)
+                const std::vector<CameraIndex>& cameras, const IndexedVector<CameraIndex, double>& readout_s,
+                const AdjustOptions& adjustment, const ParameterChoiceOptions& options)
       : block_(block),
         wanted_(cameras),
         adjustment_(adjustment),
         options_(options),
         whole_(whole_block(block, state, tracks, adjustment.observations)) {
     free_all();
-    adjust_tile(whole_.problem, whole_.state, adjustment, solve_by_condensation);
+    if (std::any_of(readout_s.begin(), readout_s.end(), [](double t) { return t != 0; }))
+      adjust_rolling(state, readout_s);
+    else
+      adjust_tile(whole_.problem, whole_.state, adjustment, solve_by_condensation);
   }
 
   std::vector<CameraChoice> run() {
@@ -52,6 +56,14 @@ class Determination {
     constexpr double kSigmas = 3;
     const double sigma = default_intrinsic_sigmas(camera)[kFocal];
     return camera.focal_known && sigma > 0 && std::abs(found[kFocal] - camera.intrinsics[kFocal]) > kSigmas * sigma;
+  }
+
+  void adjust_rolling(const BlockState& state, const IndexedVector<CameraIndex, double>& readout_s) {
+    const FramePaths paths(block_);
+    RollingShutters shutters{paths, {}, state};
+    for (const CameraIndex c : whole_.problem.cameras)
+      shutters.readouts.push_back({readout_s[c], static_cast<double>(block_.cameras[c].height)});
+    adjust_moving_tile(shutters, whole_.problem, whole_.state, adjustment_, solve_by_condensation);
   }
 
   // All parameters of the cameras to choose for become unknowns with a weak prior.
@@ -163,10 +175,11 @@ class Determination {
 
 std::vector<CameraChoice> determined_parameters(const Block& block, const BlockState& state, const TrackSet& tracks,
                                                 const std::vector<CameraIndex>& cameras,
+                                                const IndexedVector<CameraIndex, double>& readout_s,
                                                 const AdjustOptions& adjustment,
                                                 const ParameterChoiceOptions& options) {
   options.check();
-  return Determination(block, state, tracks, cameras, adjustment, options).run();
+  return Determination(block, state, tracks, cameras, readout_s, adjustment, options).run();
 }
 
 }  // namespace megablock

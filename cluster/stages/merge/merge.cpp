@@ -121,7 +121,8 @@ BlockState load_block(const Job& job, MergeInputs& inputs, const MergeCheckpoint
                       const std::optional<MergePosition>& found, const std::vector<int>& rank_of_tile,
                       TileStore& tiles) {
   MergeStart start =
-      found ? MergeStart{checkpoint.state(), {}, {}} : merge_start(job, inputs.oriented, inputs.adjusted);
+      found ? MergeStart{checkpoint.state(), {}, {}, {}} : merge_start(job, inputs.oriented, inputs.adjusted);
+  start.paths = paths_for_rolling_shutters(job.block);
   const double start_sigma = found ? 0 : start_image_sigma(job, inputs.adjusted);
   load_own_tiles(
       job, inputs, start, rank_of_tile,

@@ -5,6 +5,7 @@
 
 #include "adjust/orientation/turned_stretches.h"
 #include "adjust/problem/environment_correction.h"
+#include "adjust/problem/rolling_shutter_correction.h"
 #include "adjust/terms/build_problem.h"
 #include "adjust/terms/vertical_terms.h"
 #include "adjust/tile/tile_adjustment.h"
@@ -164,6 +165,14 @@ TileState own_solution(const TileProblem& problem, const TileAdjustment& adjustm
   return state;
 }
 
+void correct_tile(const Job& job, const BlockState& oriented, const std::optional<FramePaths>& paths,
+                  const TileState& at, TileProblem& problem) {
+  if (paths)
+    correct_rolling_shutter(tile_readouts(job.block, problem), tile_motions(*paths, problem, at, oriented), at,
+                            problem);
+  correct_measurements(job.settings.environment, job.block.ground, at, problem);
+}
+
 bool any_free(const TileProblem& problem) {
   const auto set = [](auto flag) { return flag != 0; };
   return std::any_of(problem.camera_free.begin(), problem.camera_free.end(), set) ||
@@ -173,7 +182,7 @@ bool any_free(const TileProblem& problem) {
 }  // namespace
 
 MergeStart merge_start(const Job& job, const BlockState& oriented, const std::vector<std::string>& adjusted) {
-  MergeStart start{oriented, std::vector<Similarity>(adjusted.size()), {}};
+  MergeStart start{oriented, std::vector<Similarity>(adjusted.size()), {}, {}};
   start.tile_of_frame.assign(oriented.frames.size(), TileIndex());
   std::vector<AlignmentTile> tiles;
   std::vector<TileIndex> numbers;  // [tiles]
@@ -228,8 +237,7 @@ MergeTile load_merge_tile(const Job& job, const BlockState& oriented, const Merg
   }
   for (std::size_t o = 0; o < merge.problem.kept.size(); ++o) merge.problem.kept[o] &= adjustment.kept[o];
   merge.state.points = adjustment.points;
-  correct_measurements(job.settings.environment, job.block.ground, own_solution(merge.problem, adjustment, merge.state),
-                       merge.problem);
+  correct_tile(job, oriented, start.paths, own_solution(merge.problem, adjustment, merge.state), merge.problem);
   if (start.motions.empty()) return merge;
   const Similarity& motion = start.motions[static_cast<std::size_t>(tile.value)];
   for (Eigen::Vector3d& point : merge.state.points) point = motion(point);

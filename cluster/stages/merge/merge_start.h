@@ -1,9 +1,11 @@
 // Forms the start of the global adjustment from the adjustments of the single tiles.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "adjust/problem/frame_motion.h"
 #include "adjust/problem/tile_problem.h"
 #include "adjust/terms/build_problem.h"
 #include "cluster/job/job.h"
@@ -33,6 +35,7 @@ struct MergeStart {
   std::vector<Similarity> motions;
   IndexedVector<FrameIndex, TileIndex>
       tile_of_frame;  // the tile whose motion moved the frame; invalid when more than this motion did
+  std::optional<FramePaths> paths = {};  // of blocks with rolling shutters
 };
 MergeStart merge_start(const Job& job, const BlockState& oriented, const std::vector<std::string>& adjusted);
 

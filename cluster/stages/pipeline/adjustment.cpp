@@ -3,15 +3,18 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "adjust/problem/environment_correction.h"
 #include "adjust/terms/build_problem.h"
 #include "adjust/tile/image_sigma.h"
+#include "adjust/tile/rolling_start.h"
 #include "adjust/tile/tile_adjustment.h"
 #include "adjust/tile/track_parts.h"
 #include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
+#include "cluster/stages/common/block_hash.h"
 #include "cluster/stages/common/problem_hash.h"
 #include "cluster/stages/common/units.h"
 #include "io/base/error.h"
@@ -30,6 +33,7 @@ struct OrientedTiles {
   const BlockState& oriented;
   const Tiles& tiles;
   const RowsOfTiles rows;
+  const std::optional<FramePaths> paths;  // of blocks with rolling shutters
 };
 
 // A tile before its adjustment.
@@ -51,25 +55,44 @@ TileStart measured_start(const Job& job, const OrientedTiles& from, TileIndex ti
   return start;
 }
 
-// The correction needs the heights of the ground. It takes those of the points intersected from the uncorrected
-// measurements.
-void correct_environment(const Job& job, TileStart& start) {
-  const std::vector<std::uint8_t> kept = start.problem.kept;
+// The frames, cameras and mounts of an adjusted tile.
+void take_solution(const TileState& solved, TileState& state) {
+  state.frames = solved.frames;
+  state.cameras = solved.cameras;
+  state.mounts = solved.mounts;
+}
+
+RollingShutters shutters_of(const Job& job, const OrientedTiles& from, const TileProblem& problem) {
+  return {*from.paths, tile_readouts(job.block, problem), from.oriented};
+}
+
+// Corrects the measurements for rolling shutters and for the environment. The latter needs the heights of the ground;
+// it takes those of the points intersected from measurements without it.
+void correct_start(const Job& job, const OrientedTiles& from, TileStart& start) {
   TileState at = start.state;
+  if (from.paths)
+    correct_rolling_start(shutters_of(job, from, start.problem), job.settings.adjustment, start.problem, at);
+  if (!job.settings.environment.any()) return;
+  const std::vector<std::uint8_t> kept = start.problem.kept;
   triangulate_points(start.problem, at, job.settings.adjustment);
   start.problem.kept = kept;
   correct_measurements(job.settings.environment, job.block.ground, at, start.problem);
 }
 
-TileStart make_start(const Job& job, const OrientedTiles& from, TileIndex tile, TrackSet tracks) {
+// `solved`: a solution of the tile from which corrections are taken, and in which the state begins; none: the
+// orientation of the block.
+TileStart make_start(const Job& job, const OrientedTiles& from, TileIndex tile, TrackSet tracks,
+                     const TileState* solved = nullptr) {
   TileStart start = measured_start(job, from, tile, std::move(tracks));
-  if (job.settings.environment.any()) correct_environment(job, start);
+  if (solved != nullptr) take_solution(*solved, start.state);
+  if (from.paths || job.settings.environment.any()) correct_start(job, from, start);
   return start;
 }
 
 // An adjusted tile with its tracks split into parts. The merge intersects the parts that were put back. The adjusted
 // tile is freed before the split one is made, because two of them would double the memory of the stage.
-TileStart with_parts(TileStart adjusted, const TrackParts& parts, const std::function<TileStart(TrackSet)>& start) {
+using MakeStart = std::function<TileStart(TrackSet, const TileState* solved)>;
+TileStart with_parts(TileStart adjusted, const TrackParts& parts, const MakeStart& start) {
   const std::vector<std::int64_t> rows = rows_of_split(adjusted.tracks, parts);
   TrackSet tracks = split_tracks(adjusted.tracks, parts);
   const std::vector<std::uint8_t> kept = std::move(adjusted.problem.kept);
@@ -77,7 +100,7 @@ TileStart with_parts(TileStart adjusted, const TrackParts& parts, const std::fun
   TileState state = std::move(adjusted.state);
   adjusted = {};
 
-  TileStart split = start(std::move(tracks));
+  TileStart split = start(std::move(tracks), &state);
   split.problem.kept = kept;  // rows of control points follow those of the tracks
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto row = static_cast<std::size_t>(rows[i]);
@@ -99,9 +122,18 @@ TileStart with_parts(TileStart adjusted, const TrackParts& parts, const std::fun
 TileAdjustment adjust_one(const Job& job, const OrientedTiles& from, TileIndex tile, const std::string& tracks_unit) {
   AdjustOptions options = job.settings.adjustment;
   options.only_start = true;
-  const auto start = [&](TrackSet tracks) { return make_start(job, from, tile, std::move(tracks)); };
-  TileStart adjusted = start(read_tracks(job.store.verified_path(tracks_unit)));
-  const AdjustSummary summary = adjust_tile(adjusted.problem, adjusted.state, options, solve_by_condensation);
+  // Heights and verticals for the environment are those of the orientation, as in every resumed run; the motion of
+  // rolling shutters asks for better poses than that.
+  const MakeStart start = [&](TrackSet tracks, const TileState* solved) {
+    return make_start(job, from, tile, std::move(tracks), from.paths ? solved : nullptr);
+  };
+  TileStart adjusted = start(read_tracks(job.store.verified_path(tracks_unit)), nullptr);
+  AdjustSummary summary = adjust_tile(adjusted.problem, adjusted.state, options, solve_by_condensation);
+  if (from.paths) {  // the poses tell the motion better now
+    const TileState solved = std::move(adjusted.state);
+    adjusted = start(read_tracks(job.store.verified_path(tracks_unit)), &solved);
+    summary = adjust_tile(adjusted.problem, adjusted.state, options, solve_by_condensation);
+  }
   TrackParts parts = find_track_parts(adjusted.problem, adjusted.state,
                                       screening_threshold(adjusted.problem, adjusted.state, options), options);
   const auto restored = parts.size() - static_cast<std::size_t>(std::count(parts.begin(), parts.end(), 0));
@@ -137,6 +169,14 @@ TileAdjustment adjust_one(const Job& job, const OrientedTiles& from, TileIndex t
   return result;
 }
 
+void add_motions_to_hash(const Job& job, const OrientedTiles& from, const TileStart& start, Hasher& hasher) {
+  for (const Readout& readout : tile_readouts(job.block, start.problem)) hasher.add(readout.time_s);
+  for (const Motion& motion : tile_motions(*from.paths, start.problem, start.state, from.oriented)) {
+    add_to_hash(hasher, motion.velocity);
+    add_to_hash(hasher, motion.turn);
+  }
+}
+
 struct TileMark {
   std::uint64_t fingerprint = 0;
   std::int64_t observations = 0;
@@ -158,6 +198,7 @@ std::vector<TileMark> tile_marks(const Stage& stage, const Job& job, const Orien
       add_to_hash(hasher, job.settings.adjustment);
       if (job.settings.environment.any()) add_to_hash(hasher, job.settings.environment);
       add_to_hash(hasher, start.problem, start.state);
+      if (from.paths) add_motions_to_hash(job, from, start, hasher);
       writer.value(TileMark{hasher.value(), start.problem.observation_count()});
       job.tables.release();
     }
@@ -182,7 +223,8 @@ std::vector<TileMark> tile_marks(const Stage& stage, const Job& job, const Orien
 std::vector<std::string> run_adjustment(const Stage& stage, const Job& job, JobRecord& record,
                                         const BlockState& oriented, const Tiles& tiles,
                                         const std::vector<std::string>& tracks) {
-  const OrientedTiles from{oriented, tiles, rows_of_tiles(job.block, oriented, tiles)};
+  const OrientedTiles from{oriented, tiles, rows_of_tiles(job.block, oriented, tiles),
+                           paths_for_rolling_shutters(job.block)};
   job.tables.release();
   const std::vector<TileMark> marks = tile_marks(stage, job, from, tracks);
   std::vector<Unit> units;

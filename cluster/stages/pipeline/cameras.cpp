@@ -1,11 +1,13 @@
 #include "cluster/stages/pipeline/cameras.h"
 
-// A unit is a rig whose cameras ask for a choice. Its file has a line for each of them: the number of the camera in the
-// block, the chosen parameters as a mask, 1 where the focal length is contradicted, and the reason.
+// A unit is a rig whose cameras ask for a choice of their parameters or for their readout time. Its file has a line for
+// each of them: the number of the camera in the block, the chosen parameters as a mask, 1 where the focal length is
+// contradicted, the readout time in microseconds, and the reason.
 
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 
 #include "adjust/calibration/camera_sample.h"
@@ -17,12 +19,15 @@
 #include "io/base/hash.h"
 #include "io/project/inputs/camera_priors.h"
 #include "merge/camera/determined_parameters.h"
+#include "merge/camera/readout_time.h"
 
 namespace megablock {
 
 namespace {
 
-// Cameras that ask for a choice and belong to this rig: a camera of several rigs belongs to the first of them.
+bool asks_its_images(const Camera& camera) { return camera.choose || camera.estimate_readout; }
+
+// Cameras that ask for something and belong to this rig: a camera of several rigs belongs to the first of them.
 std::vector<CameraIndex> cameras_of(const Block& block, RigIndex rig) {
   std::vector<CameraIndex> cameras;
   const auto carries = [&](RigIndex r, CameraIndex camera) {
@@ -30,7 +35,7 @@ std::vector<CameraIndex> cameras_of(const Block& block, RigIndex rig) {
     return std::any_of(mounts.begin(), mounts.end(), [&](const Mount& m) { return m.camera == camera; });
   };
   for (const Mount& mount : block.rigs[rig].mounts) {
-    if (!block.cameras[mount.camera].choose) continue;
+    if (!asks_its_images(block.cameras[mount.camera])) continue;
     bool earlier = false;
     for (RigIndex r(0); r < rig && !earlier; ++r.value) earlier = carries(r, mount.camera);
     if (!earlier) cameras.push_back(mount.camera);
@@ -55,7 +60,11 @@ std::uint64_t inputs_hash(const Stage& stage, const Job& job, const BlockState& 
     const Camera& camera = job.block.cameras[c];
     add_to_hash(hasher.add(camera.choose).add(camera.focal_known), camera.intrinsics);
     for (const double sigma : camera.prior_sigma) hasher.add(sigma);
+    if (camera.readout_s != 0 || camera.estimate_readout) hasher.add(camera.readout_s).add(camera.estimate_readout);
   }
+  if (std::any_of(job.block.cameras.begin(), job.block.cameras.end(),
+                  [](const Camera& c) { return c.readout_s != 0 || c.estimate_readout; }))
+    for (const Frame& frame : job.block.frames) hasher.add(frame.time_s).add(frame.pass);
   return hasher.value();
 }
 
@@ -74,56 +83,104 @@ std::vector<FrameIndex> frames_of_sample(const Job& job, const Tiles& tiles, con
   return frames;
 }
 
-std::vector<CameraChoice> choose(const Job& job, const Tiles& tiles, const BlockState& state, RigIndex rig,
-                                 const std::vector<CameraIndex>& cameras) {
+// What a unit finds for one of its cameras.
+struct Found {
+  CameraChoice choice;
+  std::int64_t readout_us = 0;
+};
+
+// The frames of a sample, and what they share.
+struct Sample {
+  BlockState state;  // the other frames are not oriented
+  TrackSet tracks;
+};
+
+Sample take_sample(const Job& job, const Tiles& tiles, const BlockState& state, RigIndex rig) {
   const CameraSampleOptions options;
   const std::vector<FrameIndex> frames = frames_of_sample(job, tiles, state, rig, options);
-  BlockState sample = state;
-  std::fill(sample.oriented.begin(), sample.oriented.end(), std::uint8_t{0});
-  for (const FrameIndex f : frames) sample.oriented[f] = 1;
+  Sample sample{state, {}};
+  std::fill(sample.state.oriented.begin(), sample.state.oriented.end(), std::uint8_t{0});
+  for (const FrameIndex f : frames) sample.state.oriented[f] = 1;
   std::vector<ImageIndex> images;
   for (ImageIndex i(0); job.block.images.contains(i); ++i.value)
-    if (sample.oriented[job.block.images[i].frame]) images.push_back(i);
+    if (sample.state.oriented[job.block.images[i].frame]) images.push_back(i);
+  if (images.empty()) throw ComputeError("no image of it is oriented");
+  const MeasurementStore store(job.store.directory());
+  sample.tracks = tracks_in_frames(job.block, store.of_images(images), options.max_observations);
+  return sample;
+}
+
+std::vector<Found> find(const Job& job, const Tiles& tiles, const BlockState& state, RigIndex rig,
+                        const std::vector<CameraIndex>& cameras) {
+  IndexedVector<CameraIndex, double> readout_s;
+  for (const Camera& camera : job.block.cameras) readout_s.push_back(camera.readout_s);
+  std::vector<Found> found(cameras.size());
+  std::vector<std::string> readouts(cameras.size());
+  std::vector<CameraIndex> to_choose;
+  for (const CameraIndex c : cameras)
+    if (job.block.cameras[c].choose) to_choose.push_back(c);
+  std::vector<CameraChoice> choices;
   try {
-    if (images.empty()) throw ComputeError("no image of it is oriented");
-    const MeasurementStore store(job.store.directory());
-    const TrackSet tracks = tracks_in_frames(job.block, store.of_images(images), options.max_observations);
-    return determined_parameters(job.block, sample, tracks, cameras, job.settings.adjustment, {});
+    const Sample sample = take_sample(job, tiles, state, rig);
+    for (std::size_t i = 0; i < cameras.size(); ++i)
+      if (const Camera& camera = job.block.cameras[cameras[i]]; camera.estimate_readout) {
+        const ReadoutChoice choice = choose_readout(
+            estimate_readout(job.block, sample.state, sample.tracks, readout_s, cameras[i], job.settings.adjustment),
+            camera.readout_s);
+        readout_s[cameras[i]] = choice.time_s;
+        readouts[i] = choice.reason;
+      }
+    if (!to_choose.empty())
+      choices = determined_parameters(job.block, sample.state, sample.tracks, to_choose, readout_s,
+                                      job.settings.adjustment, {});
   } catch (const ComputeError& error) {
     // Images that say nothing of each other, such as one alone. The rest of the block may still say something.
-    std::vector<CameraChoice> usual;
-    for (const CameraIndex c : cameras)
-      usual.push_back({usual_parameters(job.block.cameras[c].intrinsics.model()),
-                       fmt::format("estimated: the usual parameters; no choice: {}", error.what())});
-    return usual;
+    choices.clear();
+    for (const CameraIndex c : to_choose)
+      choices.push_back({usual_parameters(job.block.cameras[c].intrinsics.model()),
+                         fmt::format("estimated: the usual parameters; no choice: {}", error.what())});
   }
+  for (std::size_t i = 0, chosen = 0; i < cameras.size(); ++i) {
+    if (job.block.cameras[cameras[i]].choose) found[i].choice = choices[chosen++];
+    found[i].readout_us = std::llround(1e6 * readout_s[cameras[i]]);
+    std::string& reason = found[i].choice.reason;
+    reason += (reason.empty() || readouts[i].empty() ? "" : "; ") + readouts[i];
+  }
+  return found;
 }
 
-void write_choices(const std::string& path, const std::vector<CameraIndex>& cameras,
-                   const std::vector<CameraChoice>& choices) {
+void write_found(const std::string& path, const std::vector<CameraIndex>& cameras, const std::vector<Found>& found) {
   std::ofstream out(path);
   for (std::size_t c = 0; c < cameras.size(); ++c)
-    out << cameras[c].value << ' ' << choices[c].estimated << ' ' << choices[c].focal_contradicted << ' '
-        << choices[c].reason << '\n';
+    out << cameras[c].value << ' ' << found[c].choice.estimated << ' ' << found[c].choice.focal_contradicted << ' '
+        << found[c].readout_us << ' ' << found[c].choice.reason << '\n';
 }
 
-void take_choices(const std::string& path, Block& block, BlockState& state) {
+void take_choice(CameraChoice choice, Camera& camera, Intrinsics& values) {
+  if (choice.focal_contradicted) {
+    camera.focal_known = false;
+    choice.reason = fmt::format("the images contradict the focal length of {:.0f} px, which becomes a guess; {}",
+                                camera.intrinsics[kFocal], choice.reason);
+  }
+  camera.prior_sigma = default_intrinsic_sigmas(camera, choice.estimated);
+  camera.choice = choice.reason;
+  for (int p = 0; p < values.size(); ++p)
+    if (!contains(choice.estimated, p))
+      values[static_cast<std::size_t>(p)] = camera.intrinsics[static_cast<std::size_t>(p)];
+}
+
+void take_found(const std::string& path, Block& block, BlockState& state) {
   std::ifstream in(path);
   std::int64_t number = 0;
-  CameraChoice choice;
-  while (in >> number >> choice.estimated >> choice.focal_contradicted && std::getline(in >> std::ws, choice.reason)) {
+  Found found;
+  while (in >> number >> found.choice.estimated >> found.choice.focal_contradicted >> found.readout_us &&
+         std::getline(in >> std::ws, found.choice.reason)) {
     Camera& camera = block.cameras[CameraIndex(number)];
-    if (choice.focal_contradicted) {
-      camera.focal_known = false;
-      choice.reason = fmt::format("the images contradict the focal length of {:.0f} px, which becomes a guess; {}",
-                                  camera.intrinsics[kFocal], choice.reason);
-    }
-    camera.prior_sigma = default_intrinsic_sigmas(camera, choice.estimated);
-    camera.choice = choice.reason;
-    Intrinsics& values = state.cameras[CameraIndex(number)];
-    for (int p = 0; p < values.size(); ++p)
-      if (!contains(choice.estimated, p))
-        values[static_cast<std::size_t>(p)] = camera.intrinsics[static_cast<std::size_t>(p)];
+    if (camera.choose)
+      take_choice(found.choice, camera, state.cameras[CameraIndex(number)]);
+    else
+      camera.choice = found.choice.reason;
+    camera.readout_s = 1e-6 * static_cast<double>(found.readout_us);
   }
 }
 
@@ -140,7 +197,7 @@ void run_cameras(const Stage& stage, const Job& job, JobRecord& record, const Ti
     unit.name = fmt::format("{}/{:06}.txt", stage.folder(), rig.value);
     unit.fingerprint = Hasher().add(inputs).add(rig.value).value();
     unit.write = [&job, &tiles, &state, rig, cameras](const std::string& path) {
-      write_choices(path, cameras, choose(job, tiles, state, rig, cameras));
+      write_found(path, cameras, find(job, tiles, state, rig, cameras));
     };
     units.push_back(std::move(unit));
   }
@@ -152,9 +209,9 @@ void run_cameras(const Stage& stage, const Job& job, JobRecord& record, const Ti
   if (!outcome.failures.empty())
     throw AgreedError<ComputeError>("the parameters of the cameras could not be chosen: " +
                                     outcome.failures.front().reason);
-  for (const Unit& unit : units) take_choices(job.store.verified_path(unit.name), block, state);
+  for (const Unit& unit : units) take_found(job.store.verified_path(unit.name), block, state);
   for (const Camera& camera : block.cameras)
-    if (camera.choose) say(job, stage.name, fmt::format("camera '{}': {}", camera.name, camera.choice));
+    if (asks_its_images(camera)) say(job, stage.name, fmt::format("camera '{}': {}", camera.name, camera.choice));
 }
 
 }  // namespace megablock

@@ -153,6 +153,14 @@ std::string interest_points_table(const BlockResult& result) {
   return table.empty() ? "" : "<h3>Interest points</h3>" + table.html();
 }
 
+std::string readout_line(const Camera& camera) {
+  if (camera.readout_s == 0) return "";
+  return paragraph("Rolling shutter: " + fixed(1000 * std::abs(camera.readout_s), 1) + " ms from the " +
+                       (camera.readout_s > 0 ? "first row to the last" : "last row to the first") +
+                       ". Measurements are corrected for the motion in this time.",
+                   "muted");
+}
+
 }  // namespace
 
 std::string cameras_section(const BlockResult& result, const Figures& f) {
@@ -168,7 +176,7 @@ std::string cameras_section(const BlockResult& result, const Figures& f) {
                             fixed(opening(c, k, {0.5 * c.width, 0}), 0), fixed(opening(c, k, {0, 0.5 * c.height}), 0),
                             count(f.camera_images[camera]), c.focal_known ? "" : "; focal length was a guess"),
                 "muted") +
-            (c.choice.empty() ? "" : paragraph("Chosen by the block: " + escape(c.choice) + ".")) +
+            readout_line(c) + (c.choice.empty() ? "" : paragraph("Chosen by the block: " + escape(c.choice) + ".")) +
             camera_table(result, camera) + correlation_table(result, camera);
   }
   if (result.block.cameras.next_index().value > listed)

@@ -12,6 +12,7 @@
 
 #include "geometry/numbers/angles.h"
 #include "io/simulate/scene/terrain.h"
+#include "io/simulate/scene/wander.h"
 
 namespace megablock {
 
@@ -68,6 +69,23 @@ Eigen::Quaterniond nadir_rotation(double right) {
   return Eigen::Quaterniond(r).normalized();
 }
 
+// A flight line with a rolling shutter: the deviations from it are smooth, so that the path has a velocity.
+class SmoothLine {
+ public:
+  // `deviations`: their rms on the axes, metres.
+  SmoothLine(const SimulationOptions& options, std::int64_t line, const Eigen::Vector3d& deviations)
+      : SmoothLine(Random(options.seed, Random::Purpose::kTrajectory, static_cast<std::uint64_t>(line)), deviations) {}
+  Eigen::Vector3d deviation(double t) const { return deviations_.cwiseProduct(wander_.at(t)); }
+  Motion motion(double t, const Eigen::Vector3d& velocity) const {
+    return {velocity + deviations_.cwiseProduct(wander_.rate(t)), Eigen::Vector3d::Zero()};
+  }
+
+ private:
+  SmoothLine(Random random, const Eigen::Vector3d& deviations) : wander_(random), deviations_(deviations) {}
+  Wander wander_;
+  Eigen::Vector3d deviations_;
+};
+
 }  // namespace
 
 Layout make_aerial_layout(const SimulationOptions& options) {
@@ -90,14 +108,26 @@ Layout make_aerial_layout(const SimulationOptions& options) {
     Pose pose;
     pose.centre = {(along - 0.5 * static_cast<double>(per_line - 1)) * base,
                    (static_cast<double>(line) - 0.5 * static_cast<double>(lines - 1)) * spacing, options.height_m};
+    const Eigen::Vector3d deviations(0.03 * base, 0.02 * spacing, 0.01 * options.height_m);
     // Normal deviations are cut off, so that a rare large one cannot open a gap between the lines.
-    pose.centre += Eigen::Vector3d(0.03 * base, 0.02 * spacing, 0.01 * options.height_m)
-                       .cwiseProduct(random.normal3().cwiseMin(2).cwiseMax(-2));
+    const Eigen::Vector3d scatter = deviations.cwiseProduct(random.normal3().cwiseMin(2).cwiseMax(-2));
+    double time_s = 2.0 * static_cast<double>(f);
+    std::optional<Motion> motion;
+    if (options.readout_ms == 0) {
+      pose.centre += scatter;
+    } else {
+      constexpr double kTurnS = 20;  // from one line to the next
+      const double leg_s = base / options.speed_mps, in_line_s = static_cast<double>(place) * leg_s;
+      time_s = static_cast<double>(line) * (static_cast<double>(per_line) * leg_s + kTurnS) + in_line_s;
+      const SmoothLine path(options, line, deviations);
+      pose.centre += path.deviation(in_line_s);
+      motion = path.motion(in_line_s, {(westward ? -1 : 1) * options.speed_mps, 0, 0});
+    }
     const Eigen::Vector3d tilt = random.normal3().cwiseMin(2.5).cwiseMax(-2.5);
     pose.rotation = nadir_rotation(heading - std::numbers::pi / 2);
     // Turns about the axes of the ground: two tilts, then the heading.
     pose.rotation = rotation_update(pose.rotation, kDegree * Eigen::Vector3d(1.0, 1.0, 1.5).cwiseProduct(tilt));
-    add_simulated_frame(layout, pose, line, 2.0 * static_cast<double>(f));
+    add_simulated_frame(layout, pose, line, time_s, motion);
   }
   layout.scene = std::make_unique<AerialScene>(options, layout.truth.cameras[camera]);
   return layout;

@@ -77,13 +77,26 @@ std::optional<Eigen::Vector2d> Observer::pixel_of(ImageIndex image, const Eigen:
   const CameraIndex camera(view.camera);
   const double radius_sq = inside.head<2>().squaredNorm() / (inside.z() * inside.z());
   if (!all_around && radius_sq > max_radius_sq_[static_cast<std::size_t>(view.camera)]) return std::nullopt;
-  const Eigen::Vector2d pixel = project(layout_.truth.cameras[camera], inside);
-  if (!pixel.allFinite()) return std::nullopt;
   const Camera& size = layout_.block.cameras[camera];
+  const Eigen::Vector2d pixel =
+      layout_.motions.empty() ? project(layout_.truth.cameras[camera], inside) : rolling_pixel(image, place);
+  if (!pixel.allFinite()) return std::nullopt;
   if (pixel.x() < margin_px_ || pixel.x() > size.width - margin_px_ || pixel.y() < margin_px_ ||
       pixel.y() > size.height - margin_px_)
     return std::nullopt;
   return pixel;
+}
+
+Eigen::Vector2d Observer::rolling_pixel(ImageIndex image, const Eigen::Vector3d& place) const {
+  const Image& entry = layout_.block.images[image];
+  const CameraIndex camera = layout_.block.camera_of(image);
+  const RigIndex rig = layout_.block.frames[entry.frame].rig;
+  return moving_pixel({layout_.truth.cameras[camera],
+                       layout_.truth.frames[entry.frame],
+                       layout_.truth.mounts[rig][static_cast<std::size_t>(entry.mount)],
+                       layout_.motions[static_cast<std::size_t>(entry.frame.value)],
+                       {layout_.readout_s, static_cast<double>(layout_.block.cameras[camera].height)}},
+                      place);
 }
 
 std::vector<Sighting> Observer::sightings(const SurfacePoint& point) const {

@@ -23,7 +23,8 @@ class Observer {
   Observer(const Layout& layout, double margin_px);
   // The images that see a point, ascending.
   std::vector<Sighting> sightings(const SurfacePoint& point) const;
-  // The pixel of a place in an image, even if something hides it. Empty if it is outside the image.
+  // The pixel of a place in an image, even if something hides it. Empty if it is outside the image. A camera with a
+  // rolling shutter sees the place from where it is when it reads that row.
   std::optional<Eigen::Vector2d> pixel_of(ImageIndex image, const Eigen::Vector3d& place) const;
 
  private:
@@ -32,6 +33,7 @@ class Observer {
     Eigen::Vector3d centre;
     std::int64_t camera = 0;
   };
+  Eigen::Vector2d rolling_pixel(ImageIndex image, const Eigen::Vector3d& place) const;
   void look(std::int64_t frame, const SurfacePoint& point, std::vector<Sighting>& seen) const;
 
   const Layout& layout_;

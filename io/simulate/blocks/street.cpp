@@ -33,8 +33,42 @@ Pose mount_pose(const SimulationOptions& options, int camera) {
   return mount;
 }
 
+constexpr double kRounded = 5;  // metres: ends of a drive whose places cannot be rounded off
+
+// The same drive with a rolling shutter: without scatter of the places and at a constant speed, on a path whose corners
+// are rounded off as its directions are, so that it has a velocity.
+void add_smooth_drive(const SimulationOptions& options, const StreetScene& scene, const Drive& drive, std::int64_t pass,
+                      std::int64_t frames, Layout& layout) {
+  const double turn = pass == 0 ? 1 : -1;
+  const auto start = static_cast<double>(frames) - 0.5;
+  const auto forward_at = [&](double t) -> Eigen::Vector2d {
+    const double way = options.speed_mps * t;
+    return turn * drive.forward(pass == 0 ? kRounded + way : kRounded + options.frame_distance_m * start - way);
+  };
+  const auto place_at = [&](double t) -> Eigen::Vector3d {
+    const double way = options.speed_mps * t;
+    const Eigen::Vector2d forward = forward_at(t), right(forward.y(), -forward.x());
+    const Eigen::Vector2d place =
+        drive.rounded_at(pass == 0 ? kRounded + way : kRounded + options.frame_distance_m * start - way) +
+        kLane * right;
+    return {place.x(), place.y(), scene.ground(place.x(), place.y()) + kRigHeight};
+  };
+  for (std::int64_t i = 0; i < frames; ++i) {
+    Random random(options.seed, Random::Purpose::kFrame, static_cast<std::uint64_t>(layout.block.frames.size()));
+    const double t = static_cast<double>(i) * options.frame_distance_m / options.speed_mps;
+    constexpr double kStepS = 1e-3;
+    const Eigen::Vector2d before = forward_at(t - kStepS), after = forward_at(t + kStepS);
+    const double turned = std::atan2(before.x() * after.y() - before.y() * after.x(), before.dot(after));
+    const Motion motion{(place_at(t + kStepS) - place_at(t - kStepS)) / (2 * kStepS), {0, 0, turned / (2 * kStepS)}};
+    const Eigen::Quaterniond rotation = rotation_update(
+        level_rotation(forward_at(t)), kDegree * Eigen::Vector3d(0.5, 0.5, 1).cwiseProduct(random.normal3()));
+    add_simulated_frame(layout, {rotation, place_at(t)}, pass, t + 1e6 * static_cast<double>(pass), motion);
+  }
+}
+
 void add_drive(const SimulationOptions& options, const StreetScene& scene, const Drive& drive, std::int64_t pass,
                std::int64_t frames, Layout& layout) {
+  if (options.readout_ms != 0) return add_smooth_drive(options, scene, drive, pass, frames, layout);
   for (std::int64_t i = 0; i < frames; ++i) {
     const auto index = static_cast<std::uint64_t>(layout.block.frames.size());
     Random random(options.seed, Random::Purpose::kFrame, index);
@@ -73,7 +107,8 @@ Layout make_street_layout(const SimulationOptions& options) {
 
   auto scene = std::make_unique<StreetScene>(options, street_terrain(options));
   const std::int64_t first = (options.frames + 1) / 2;
-  const double needed = options.frame_distance_m * static_cast<double>(first);
+  const double needed =
+      options.frame_distance_m * static_cast<double>(first) + (options.readout_ms != 0 ? 2 * kRounded : 0);
   std::int64_t streets = 2;
   // The smallest grid that is longer than the first drive.
   while (Drive(drive_corners(streets, options.street_spacing_m)).length() < needed) ++streets;

@@ -66,6 +66,8 @@ CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layou
   } else {
     camera.intrinsics = truth;
   }
+  camera.readout_s = options.start_readout * options.readout_ms / 1000;
+  layout.readout_s = options.readout_ms / 1000;
   layout.block.cameras.push_back(camera);
   layout.truth.cameras.push_back(truth);
   return index;
@@ -81,7 +83,8 @@ CameraIndex add_single_camera_rig(const SimulationOptions& options, Layout& layo
   return camera;
 }
 
-void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, double time_s) {
+void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, double time_s,
+                         const std::optional<Motion>& motion) {
   const FrameIndex index = layout.block.frames.next_index();
   const RigIndex rig(0);
   const std::size_t cameras = layout.block.rigs[rig].mounts.size();
@@ -102,6 +105,7 @@ void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, do
   if (cameras == 1) frame.name += ".jpg";  // the frame of a single image has the name of this image
   layout.block.frames.push_back(std::move(frame));
   layout.truth.frames.push_back(pose);
+  if (motion) layout.motions.push_back(*motion);
   layout.truth.oriented.push_back(1);
 }
 

@@ -5,9 +5,11 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "geometry/camera/rolling_shutter.h"
 #include "io/simulate/scene/scene.h"
 
 namespace megablock {
@@ -21,6 +23,9 @@ struct Layout {
   std::vector<Eigen::Vector3d> control_truth;  // positions [block.control_points]
   std::vector<std::string> image_suffixes;     // [mounts] ends of image names; empty: "_c0", ..., none for one camera
   std::vector<Eigen::Vector2d> crossings;      // of streets with frames; zones of control may be there
+  // Of rolling shutters: the true readout time, and the true motions [frames]; 0 and empty without.
+  double readout_s = 0;
+  std::vector<Motion> motions;
 };
 
 // Adds a camera with its nominal values in the block and its true values in the state (SimulationOptions::distortion,
@@ -28,7 +33,8 @@ struct Layout {
 CameraIndex add_simulated_camera(const SimulationOptions& options, Layout& layout);
 // Adds such a camera and the only rig of the block, which has this one camera. Returns the camera.
 CameraIndex add_single_camera_rig(const SimulationOptions& options, Layout& layout);
-// Adds a frame with one image for each mount of the only rig.
-void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, double time_s);
+// Adds a frame with one image for each mount of the only rig. Its motion is for rolling shutters only.
+void add_simulated_frame(Layout& layout, const Pose& pose, std::int64_t pass, double time_s,
+                         const std::optional<Motion>& motion = {});
 
 }  // namespace megablock

@@ -118,6 +118,12 @@ void SimulationOptions::check() const {
   require_option(affinity >= 0 && affinity < 0.1, "affinity must lie in [0, 0.1)");
   require_option(affinity == 0 || (camera_model == model_name(CameraModel()) && published_camera == 0),
                  "affinity needs the camera model brown");
+  require_option(std::abs(readout_ms) <= 1000, "readout_ms must lie in [-1000, 1000]");
+  require_option(readout_ms == 0 || scene == Scene::kAerial || scene == Scene::kStreet,
+                 "readout_ms is for the scenes aerial and street");
+  require_option(start_readout >= 0 && start_readout * std::abs(readout_ms) <= 1000,
+                 "start_readout must be at least 0, and start_readout times readout_ms at most 1000");
+  require_option(speed_mps > 0 && speed_mps <= 1000, "speed_mps must lie in (0, 1000]");
   require_option(start_focal > 0.2 && start_focal < 5, "start_focal must lie in (0.2, 5)");
   require_option(published_camera == 0 || !has_vehicle(scene),
                  "published_camera is not for scenes with the vehicle's rig");

@@ -88,6 +88,9 @@ struct SimulationOptions {
   // Brown's model: largest affinity b1 and skew b2 of the true camera, as a share of the focal length. They are free
   // then, and zero at first.
   double affinity = 0;
+  // Aerial, street: rolling shutter. The readout time of all rows, ms (0: none), the readout time that the block states
+  // over the true one, and the speed. The path is smooth then, so that its velocity has a meaning.
+  double readout_ms = 0, start_readout = 1, speed_mps = 10;
   bool calibrate = true;     // camera parameters are free; otherwise held at the truth
   bool free_cameras = true;  // Stereopolis, target field: cameras are free; otherwise held (mounts as `calibrate`)
   // Aerial, street, panorama: takes a camera of the published simulations (1 to 4) with its size and focal length as

@@ -37,6 +37,13 @@ Eigen::Vector2d Drive::at(double s) const {
                   : corners_[i];
 }
 
+Eigen::Vector2d Drive::rounded_at(double s) const {
+  constexpr int kSteps = 20;
+  Eigen::Vector2d sum = 0.5 * (at(s - 5) + at(s + 5));
+  for (int i = 1; i < kSteps; ++i) sum += at(s - 5 + 10.0 * i / kSteps);
+  return sum / kSteps;
+}
+
 // The rows are the axes of the rig in the ground: right = (forward turned by -90 degrees), down = -z, forward.
 Eigen::Quaterniond level_rotation(const Eigen::Vector2d& forward) {
   Eigen::Matrix3d r;

@@ -24,6 +24,8 @@ class Drive {
   double length_to(std::size_t corner) const { return length_[corner]; }
   const std::vector<Eigen::Vector2d>& corners() const { return corners_; }
   Eigen::Vector2d at(double s) const;
+  // The mean of the places from five metres before to five metres after.
+  Eigen::Vector2d rounded_at(double s) const;
   // The direction as a unit vector. Corners are rounded off over ten metres.
   Eigen::Vector2d forward(double s) const { return (at(s + 5) - at(s - 5)).normalized(); }
 

@@ -33,6 +33,7 @@ GroundFrame get_ground(const Hdf5Reader& file) {
   return ground;
 }
 
+constexpr const char *kReadout = "cameras/readout", *kEstimateReadout = "cameras/estimate_readout";
 constexpr const char *kChoose = "cameras/choose", *kChoice = "cameras/choice";
 
 void put_cameras(Hdf5Writer& file, const IndexedVector<CameraIndex, Camera>& cameras) {
@@ -51,7 +52,15 @@ void put_cameras(Hdf5Writer& file, const IndexedVector<CameraIndex, Camera>& cam
   file.vector("cameras/focal_known", column(cameras, [](const Camera& c) -> std::uint8_t { return c.focal_known; }),
               {"", "1: from EXIF, sensor table or project file; 0: a guess"});
   file.texts("cameras/mask_path", column(cameras, [](const Camera& c) { return c.mask_path; }));
-  if (std::none_of(cameras.begin(), cameras.end(), [](const Camera& c) { return c.choose; })) return;
+  if (std::any_of(cameras.begin(), cameras.end(),
+                  [](const Camera& c) { return c.readout_s != 0 || c.estimate_readout; })) {
+    file.vector(kReadout, column(cameras, [](const Camera& c) { return c.readout_s; }),
+                {"s", "from the first row of an image to the last; 0: no rolling shutter"});
+    file.vector(kEstimateReadout, column(cameras, [](const Camera& c) -> std::uint8_t { return c.estimate_readout; }),
+                {"", "1: found from the images"});
+  }
+  if (std::none_of(cameras.begin(), cameras.end(), [](const Camera& c) { return c.choose || !c.choice.empty(); }))
+    return;
   file.vector(kChoose, column(cameras, [](const Camera& c) -> std::uint8_t { return c.choose; }),
               {"", "1: the block decides which parameters are estimated"});
   file.texts(kChoice, column(cameras, [](const Camera& c) { return c.choice; }), {"", "what it decided, and why"});
@@ -64,6 +73,10 @@ IndexedVector<CameraIndex, Camera> get_cameras(const Hdf5Reader& file) {
   const std::vector<CameraModel> models = get_models(file, count);
   const auto known = file.vector<std::uint8_t>("cameras/focal_known", count);
   const std::vector<std::string> masks = file.texts("cameras/mask_path", count);
+  const bool any_readout = file.has(kReadout);
+  const auto readout = any_readout ? file.vector<double>(kReadout, count) : std::vector<double>(names.size());
+  const auto estimate =
+      any_readout ? file.vector<std::uint8_t>(kEstimateReadout, count) : std::vector<std::uint8_t>(names.size());
   const bool any_choice = file.has(kChoose);
   const auto choose = any_choice ? file.vector<std::uint8_t>(kChoose, count) : std::vector<std::uint8_t>(names.size());
   const auto choice = any_choice ? file.texts(kChoice, count) : std::vector<std::string>(names.size());
@@ -77,6 +90,8 @@ IndexedVector<CameraIndex, Camera> get_cameras(const Hdf5Reader& file) {
     camera.intrinsics = Intrinsics(models[i]);
     camera.focal_known = known[i] != 0;
     camera.mask_path = masks[i];
+    camera.readout_s = readout[i];
+    camera.estimate_readout = estimate[i] != 0;
     camera.choose = choose[i] != 0;
     camera.choice = choice[i];
     intrinsics.push_back(camera.intrinsics.data());

@@ -20,6 +20,8 @@ inline Block example_block() {
                            {10, 5, 5, infinity, infinity, 0, 1e-3, 1e-3},
                            true,
                            "masks/vorn \xc3\xa4.png",
+                           0.025,
+                           true,
                            true,
                            "estimated: f"});
   block.cameras.push_back({"back",
@@ -29,6 +31,8 @@ inline Block example_block() {
                            {},
                            false,
                            "",
+                           0,
+                           false,
                            false,
                            ""});
   Rig pair{"pair", {Mount{CameraIndex(0), {}, 0, 0}, Mount{CameraIndex(1), {}, 0.01, 0.002}}};

@@ -10,6 +10,7 @@ using fixture::read_text;
 using fixture::refusal;
 using fixture::write_image_file;
 using fixture::write_line;
+using ::testing::AllOf;
 using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -55,6 +56,32 @@ TEST(ProjectCameras, CameraSettingsOverrideTheHeaders) {
   EXPECT_EQ(camera.prior_sigma, (IntrinsicSigmas{1.6, 1.28, 1.28, 0.2, 0, 0, 0, 0}));
   EXPECT_EQ(camera.mask_path, folder.path("mask.png"));
   EXPECT_THAT(block.cameras[CameraIndex(1)].prior_sigma, Each(0.0));
+}
+
+// The cameras of the line are DJI's FC300S, which reads its rows in 33 ms (io/images/readout_times.csv).
+TEST(ProjectCameras, ReadoutTimesAreThoseOfTheTableOrTheProject) {
+  ScratchDirectory folder;
+  write_line(folder, 1);
+  const auto camera = [&](const std::string& keys) {
+    return read_text(folder, "images: images\ncameras:\n  default: {" + keys + "}\n").block.cameras[CameraIndex(0)];
+  };
+  EXPECT_EQ(camera("").readout_s, 0.033);
+  EXPECT_TRUE(camera("").estimate_readout);  // the images must confirm it
+  EXPECT_TRUE(camera("readout_ms: auto").estimate_readout);
+  EXPECT_FALSE(camera("readout_ms: 0").estimate_readout);
+  EXPECT_EQ(camera("readout_ms: 0").readout_s, 0);
+  EXPECT_EQ(camera("readout_ms: -21.5").readout_s, -0.0215);
+  EXPECT_FALSE(camera("readout_ms: 20").estimate_readout);
+  EXPECT_TRUE(camera("readout_ms: estimate").estimate_readout);
+  EXPECT_EQ(camera("readout_ms: estimate").readout_s, 0);
+  EXPECT_EQ(camera("readout_ms: 20").prior_sigma, camera("").prior_sigma);
+  // The images of the line have no times.
+  for (const std::string value : {"20", "estimate"})
+    EXPECT_THAT(read_text(folder, "images: images\ncameras: {default: {readout_ms: " + value + "}}\n").warnings,
+                ElementsAre(HasSubstr("has a rolling shutter (readout_ms), but its images have no times")));
+  EXPECT_THAT(refusal(folder, "images: images\ncameras: {default: {readout_ms: 1200}}\n"), HasSubstr("readout_ms"));
+  EXPECT_THAT(refusal(folder, "images: images\ncameras: {default: {readout_ms: guess}}\n"),
+              AllOf(HasSubstr("readout_ms"), HasSubstr("guess")));
 }
 
 TEST(ProjectCameras, MaskFolderIsReadByCameraName) {

@@ -15,7 +15,9 @@ using testing::HasSubstr;
 CameraChoice choice_of(const SimulatedBlock& simulated) {
   BlockState start = simulated.truth;
   start.cameras = initial_state(simulated.block).cameras;
-  return determined_parameters(simulated.block, start, simulated.tracks, {CameraIndex(0)}, {}, {}).front();
+  return determined_parameters(simulated.block, start, simulated.tracks, {CameraIndex(0)},
+                               IndexedVector<CameraIndex, double>(1, 0.0), {}, {})
+      .front();
 }
 
 SimulationOptions aerial(std::int64_t frames) {

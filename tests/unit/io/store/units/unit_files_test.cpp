@@ -27,6 +27,8 @@ void expect_equal(const Camera& a, const Camera& b) {
   EXPECT_EQ(a.prior_sigma, b.prior_sigma);
   EXPECT_EQ(a.focal_known, b.focal_known);
   EXPECT_EQ(a.mask_path, b.mask_path);
+  EXPECT_EQ(a.readout_s, b.readout_s);
+  EXPECT_EQ(a.estimate_readout, b.estimate_readout);
 }
 
 void expect_equal(const Frame& a, const Frame& b) {
