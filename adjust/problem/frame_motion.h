@@ -10,12 +10,12 @@
 // counts.
 //
 // Many headers tell times in whole seconds. A time between neighbours is then almost unknown, but that over a longer
-// way is not: the speed is the length of the path divided by its time, over 20 seconds if the path is that long, and
+// way is not: the speed is the length of the path divided by its time, over 10 seconds before and after the frame, and
 // takes the place of the times.
 //
 // Three angular velocities tell how the frame turns: that of the path, and those from its attitude to the attitudes of
-// both neighbours. Single attitudes and places scatter, as a gimbal does, so a turn that only some of them show is none.
-// Each component counts with the smallest magnitude of the three, and not at all where the signs differ.
+// both neighbours. Single attitudes and places scatter, as a gimbal does, so a turn that only some of them show is
+// none. Each component counts with the smallest magnitude of the three, and not at all where the signs differ.
 #pragma once
 
 #include <functional>

@@ -22,7 +22,7 @@ std::vector<Readout> tile_readouts(const Block& block, const TileProblem& proble
 // the shift. It is not that of the measured row: measurements would then be stretched with their errors, and an
 // estimate of the readout time would take the longest one for the best (by 3 ms in a flight with a noise of half a
 // pixel). An unknown point has the median distance of the known ones, and the measured row. Observations stay unchanged
-// without any known point, and where a camera has no ray.
+// without any known point, and where a camera has no ray for the pixel or no pixel for the point.
 void correct_rolling_shutter(const std::vector<Readout>& readouts, const std::vector<Motion>& motions,
                              const TileState& at, TileProblem& problem);
 

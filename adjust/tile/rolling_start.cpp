@@ -7,8 +7,10 @@ void correct_rolling_start(const RollingShutters& shutters, const AdjustOptions&
   const std::vector<std::uint8_t> kept = problem.kept;
   const std::vector<double> x = problem.x, y = problem.y;
   const std::vector<Motion> motions = tile_motions(shutters.paths, problem, at, shutters.others);
+  std::vector<std::uint8_t> unknown;
+  for (const Eigen::Vector3d& point : at.points) unknown.push_back(!point.allFinite());
   for (int round = 0; round < 2; ++round) {
-    triangulate_points(problem, at, options);
+    triangulate_points(problem, at, options, unknown);
     problem.kept = kept;
     problem.x = x;
     problem.y = y;

@@ -12,9 +12,9 @@ struct RollingShutters {
   const BlockState& others;       // of frames outside of the problem (tile_motions)
 };
 
-// Corrects the measurements of the problem with the poses of `at` and with the points that follow from them. The points
-// come from the measurements as they are, and then again from the corrected ones, and stand in `at` afterwards. What is
-// kept does not change.
+// Corrects the measurements of the problem with the poses and points of `at`. Points that it does not know are
+// intersected from the measurements as they are, and then again from the corrected ones, and stand in `at` afterwards.
+// What is kept does not change.
 void correct_rolling_start(const RollingShutters& shutters, const AdjustOptions& options, TileProblem& problem,
                            TileState& at);
 

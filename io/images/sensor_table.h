@@ -1,7 +1,7 @@
 // Looks up the sensor widths of well-known cameras. They turn a focal length in millimetres into one in pixels.
 //
-// The table (sensor_widths.csv, about 3 800 cameras; camera_table.h) joins makers' data sheets with the public table of
-// COLMAP; its head states the sources and licences, and make_sensor_widths.py makes it.
+// The table (sensor_widths.csv, about 3 800 cameras; camera_table.h) joins makers' data sheets with the public tables of
+// COLMAP and OpenSfM; its head states the sources and licences, and make_sensor_widths.py makes it.
 #pragma once
 
 #include <optional>

@@ -108,10 +108,15 @@ void read_intrinsics(YamlReader& reader, Camera& camera) {
 
 namespace {
 
-// `auto` is what the table of cameras says, if the images confirm it.
-void read_readout(YamlReader& reader, Camera& camera) {
+// `auto` is what the table of cameras says (`table_s`; 0: nothing), if the images confirm it.
+void read_readout(YamlReader& reader, double table_s, Camera& camera) {
   const auto text = reader.text("readout_ms");
-  if (!text || *text == "auto") return;
+  if (!text) return;
+  if (*text == "auto") {
+    camera.readout_s = table_s;
+    camera.estimate_readout = table_s != 0;
+    return;
+  }
   camera.estimate_readout = *text == "estimate";
   camera.readout_s = 0;
   if (camera.estimate_readout) return;
@@ -121,9 +126,9 @@ void read_readout(YamlReader& reader, Camera& camera) {
   camera.readout_s = ms / 1000;
 }
 
-void read_values(YamlReader& reader, bool image_files, Camera& camera) {
+void read_values(YamlReader& reader, bool image_files, double table_readout_s, Camera& camera) {
   read_intrinsics(reader, camera);
-  read_readout(reader, camera);
+  read_readout(reader, table_readout_s, camera);
   if (const auto mask = reader.existing_file("mask")) {
     if (!image_files) refuse_unused(reader, "mask", kNoImageFiles);
     camera.mask_path = *mask;
@@ -154,8 +159,9 @@ void read_camera(YamlReader& cameras, bool image_files, Camera& camera) {
     return !section || section->keys() == std::vector<std::string>{"readout_ms"};
   };
   const bool keeps_sigmas = only_readout(common) && only_readout(own);
-  if (common) read_values(*common, image_files, camera);
-  if (own) read_values(*own, image_files, camera);
+  const double table_readout_s = camera.estimate_readout ? camera.readout_s : 0;
+  if (common) read_values(*common, image_files, table_readout_s, camera);
+  if (own) read_values(*own, image_files, table_readout_s, camera);
   // After the values, because the sigmas depend on the focal length and on whether it is known. A readout time says
   // nothing of them.
   if (!keeps_sigmas) camera.prior_sigma = default_intrinsic_sigmas(camera);

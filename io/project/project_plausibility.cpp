@@ -83,7 +83,8 @@ void warn_of_unknown_motion(Project& project) {
     if (timed[c] || !asked_for) continue;
     project.warnings.push_back("camera '" + camera.name +
                                "' has a rolling shutter (readout_ms), but its images have no times; their motion is "
-                               "not known and is not corrected");
+                               "not known and is not corrected; take images with DateTimeOriginal in their EXIF, or "
+                               "set readout_ms: 0");
   }
 }
 

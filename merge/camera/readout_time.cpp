@@ -14,8 +14,8 @@ namespace megablock {
 namespace {
 
 constexpr double kStepS = 0.01;  // d: a readout takes some hundredths of a second
-constexpr std::int64_t kMostObservations =
-    15000;  // of tie points; with more, only every second, third ... track counts
+// Observations of tie points. Where there are more, only every second, third ... track counts.
+constexpr std::int64_t kMostObservations = 15000;
 
 TrackSet thinned(const TrackSet& tracks) {
   const std::int64_t every = (tracks.observation_count() + kMostObservations - 1) / kMostObservations;
@@ -33,14 +33,16 @@ class Sample {
         kept_(whole_.problem.kept),
         x_(whole_.problem.x),
         y_(whole_.problem.y) {
+    row_ = whole_.problem.cameras.size();
     for (const CameraIndex c : whole_.problem.cameras) {
       if (c == camera) row_ = shutters_.readouts.size();
       shutters_.readouts.push_back({readout_s[c], static_cast<double>(block.cameras[c].height)});
     }
   }
 
-  // Whether a frame of the camera moves; at rest, its rows show the same.
+  // Whether a frame of the camera is in the sample and moves; at rest, its rows show the same.
   bool moves() const {
+    if (row_ == shutters_.readouts.size()) return false;
     const TileProblem& problem = whole_.problem;
     const std::vector<Motion> motions = tile_motions(paths_, problem, whole_.state, shutters_.others);
     return std::any_of(problem.images.begin(), problem.images.end(), [&](const TileImage& image) {
@@ -86,7 +88,7 @@ class Sample {
   std::vector<std::uint8_t> kept_;  // before screening
   std::vector<double> x_, y_;       // as measured
   std::vector<Motion> motions_;
-  std::size_t row_ = 0;  // of the camera
+  std::size_t row_;  // of the camera; the number of cameras where the sample does not have it
 };
 
 }  // namespace
@@ -97,7 +99,7 @@ ReadoutEstimate estimate_readout(const Block& block, const BlockState& state, co
   constexpr int kMostRounds = 5;
   constexpr double kEnoughSigmas = 0.1;
   Sample sample(block, state, tracks, camera, readout_s, options);
-  if (!sample.moves()) return {0, 0, "no path is known: its images have no times, or do not move"};
+  if (!sample.moves()) return {0, 0, "no path is known: its images have no times, do not move, or are not oriented"};
   ReadoutEstimate estimate;
   for (int round = 0; round < kMostRounds; ++round) {
     sample.adjust();
@@ -117,14 +119,13 @@ ReadoutEstimate estimate_readout(const Block& block, const BlockState& state, co
 }
 
 ReadoutChoice choose_readout(const ReadoutEstimate& found, double expected_s) {
-  constexpr double kSignificant = 3, kConfirmed = 1.0 / 3;
+  constexpr double kSignificant = 3, kConfirmed = 0.5;
   const std::string expected =
       expected_s == 0 ? "" : fmt::format(", where a table of cameras says {:.0f} ms", 1000 * expected_s);
   if (!found.failure.empty()) return {0, fmt::format("no rolling shutter{}: {}", expected, found.failure)};
   const std::string figure = fmt::format("{:.1f} ± {:.1f} ms", 1000 * found.time_s, 1000 * found.sigma_s);
   const bool significant = std::abs(found.time_s) > kSignificant * found.sigma_s,
-             confirmed = expected_s == 0 || std::abs(found.time_s - expected_s) <
-                                                kConfirmed * std::abs(expected_s) + kSignificant * found.sigma_s;
+             confirmed = expected_s == 0 || std::abs(found.time_s - expected_s) < kConfirmed * std::abs(expected_s);
   if (!significant || !confirmed)
     return {0, fmt::format("no rolling shutter: the images give a readout time of {}{}", figure, expected)};
   return {std::round(1e6 * found.time_s) / 1e6, fmt::format("readout time {} from the images{}", figure, expected)};

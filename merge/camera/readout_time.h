@@ -36,7 +36,7 @@ struct ReadoutChoice {
 };
 
 // What the images say counts if it is three sigmas from zero. It must also confirm what a table of cameras says
-// (`expected_s`; 0: nothing is expected) to a third: a drone that stops for each image has the shutter of the table,
+// (`expected_s`; 0: nothing is expected) to a half: a drone that stops for each image has the shutter of the table,
 // but not the motion that its path tells.
 ReadoutChoice choose_readout(const ReadoutEstimate& found, double expected_s);
 

@@ -11,8 +11,8 @@ from program import megablock, status
 def choice(job):
     """Number of the camera, mask and reason, without the trailer that seals the file."""
     line = (job / "cameras/000000.txt").read_bytes().split(b"\n")[0].decode()
-    camera, mask, contradicted, reason = line.split(" ", 3)
-    assert contradicted == "0"
+    camera, mask, contradicted, readout_us, reason = line.split(" ", 4)
+    assert contradicted == "0" and readout_us == "0"
     return int(camera), int(mask), reason
 
 

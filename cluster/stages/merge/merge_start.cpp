@@ -5,9 +5,9 @@
 
 #include "adjust/orientation/turned_stretches.h"
 #include "adjust/problem/environment_correction.h"
-#include "adjust/problem/rolling_shutter_correction.h"
 #include "adjust/terms/build_problem.h"
 #include "adjust/terms/vertical_terms.h"
+#include "adjust/tile/rolling_start.h"
 #include "adjust/tile/tile_adjustment.h"
 #include "adjust/tile/track_parts.h"
 #include "cluster/process/process_memory.h"
@@ -165,11 +165,11 @@ TileState own_solution(const TileProblem& problem, const TileAdjustment& adjustm
   return state;
 }
 
-void correct_tile(const Job& job, const BlockState& oriented, const std::optional<FramePaths>& paths,
-                  const TileState& at, TileProblem& problem) {
+// The measurements as the solution of the tile corrects them. Points of parts that were put back are not known in it.
+void correct_tile(const Job& job, const BlockState& oriented, const std::optional<FramePaths>& paths, TileState at,
+                  TileProblem& problem) {
   if (paths)
-    correct_rolling_shutter(tile_readouts(job.block, problem), tile_motions(*paths, problem, at, oriented), at,
-                            problem);
+    correct_rolling_start({*paths, tile_readouts(job.block, problem), oriented}, job.settings.adjustment, problem, at);
   correct_measurements(job.settings.environment, job.block.ground, at, problem);
 }
 

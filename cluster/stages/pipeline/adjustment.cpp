@@ -91,8 +91,8 @@ TileStart make_start(const Job& job, const OrientedTiles& from, TileIndex tile, 
 
 // An adjusted tile with its tracks split into parts. The merge intersects the parts that were put back. The adjusted
 // tile is freed before the split one is made, because two of them would double the memory of the stage.
-using MakeStart = std::function<TileStart(TrackSet, const TileState* solved)>;
-TileStart with_parts(TileStart adjusted, const TrackParts& parts, const MakeStart& start) {
+TileStart with_parts(const Job& job, const OrientedTiles& from, TileIndex tile, TileStart adjusted,
+                     const TrackParts& parts) {
   const std::vector<std::int64_t> rows = rows_of_split(adjusted.tracks, parts);
   TrackSet tracks = split_tracks(adjusted.tracks, parts);
   const std::vector<std::uint8_t> kept = std::move(adjusted.problem.kept);
@@ -100,7 +100,7 @@ TileStart with_parts(TileStart adjusted, const TrackParts& parts, const MakeStar
   TileState state = std::move(adjusted.state);
   adjusted = {};
 
-  TileStart split = start(std::move(tracks), &state);
+  TileStart split = measured_start(job, from, tile, std::move(tracks));
   split.problem.kept = kept;  // rows of control points follow those of the tracks
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto row = static_cast<std::size_t>(rows[i]);
@@ -122,22 +122,18 @@ TileStart with_parts(TileStart adjusted, const TrackParts& parts, const MakeStar
 TileAdjustment adjust_one(const Job& job, const OrientedTiles& from, TileIndex tile, const std::string& tracks_unit) {
   AdjustOptions options = job.settings.adjustment;
   options.only_start = true;
-  // Heights and verticals for the environment are those of the orientation, as in every resumed run; the motion of
-  // rolling shutters asks for better poses than that.
-  const MakeStart start = [&](TrackSet tracks, const TileState* solved) {
-    return make_start(job, from, tile, std::move(tracks), from.paths ? solved : nullptr);
-  };
-  TileStart adjusted = start(read_tracks(job.store.verified_path(tracks_unit)), nullptr);
+  const std::string tracks = job.store.verified_path(tracks_unit);
+  TileStart adjusted = make_start(job, from, tile, read_tracks(tracks));
   AdjustSummary summary = adjust_tile(adjusted.problem, adjusted.state, options, solve_by_condensation);
-  if (from.paths) {  // the poses tell the motion better now
+  if (from.paths) {  // the poses tell the motion better than those of the orientation
     const TileState solved = std::move(adjusted.state);
-    adjusted = start(read_tracks(job.store.verified_path(tracks_unit)), &solved);
+    adjusted = make_start(job, from, tile, read_tracks(tracks), &solved);
     summary = adjust_tile(adjusted.problem, adjusted.state, options, solve_by_condensation);
   }
   TrackParts parts = find_track_parts(adjusted.problem, adjusted.state,
                                       screening_threshold(adjusted.problem, adjusted.state, options), options);
   const auto restored = parts.size() - static_cast<std::size_t>(std::count(parts.begin(), parts.end(), 0));
-  if (restored > 0) adjusted = with_parts(std::move(adjusted), parts, start);
+  if (restored > 0) adjusted = with_parts(job, from, tile, std::move(adjusted), parts);
   TileProblem& problem = adjusted.problem;
   TileState& state = adjusted.state;
 

@@ -110,43 +110,68 @@ Sample take_sample(const Job& job, const Tiles& tiles, const BlockState& state, 
   return sample;
 }
 
-std::vector<Found> find(const Job& job, const Tiles& tiles, const BlockState& state, RigIndex rig,
-                        const std::vector<CameraIndex>& cameras) {
-  IndexedVector<CameraIndex, double> readout_s;
-  for (const Camera& camera : job.block.cameras) readout_s.push_back(camera.readout_s);
+// The readout times [cameras of the block] that the sample confirms, and the reasons [cameras]. Several cameras of a
+// rig share their poses, so that each is estimated again with what was found of the others.
+std::vector<std::string> find_readouts(const Job& job, const Sample& sample, const std::vector<CameraIndex>& cameras,
+                                       IndexedVector<CameraIndex, double>& readout_s) {
+  const Block& block = job.block;
+  const auto estimated =
+      std::count_if(cameras.begin(), cameras.end(), [&](CameraIndex c) { return block.cameras[c].estimate_readout; });
+  std::vector<std::string> reasons(cameras.size());
+  for (int pass = 0; pass < (estimated > 1 ? 2 : 1); ++pass)
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      const CameraIndex c = cameras[i];
+      if (!block.cameras[c].estimate_readout) continue;
+      const ReadoutChoice choice =
+          choose_readout(estimate_readout(block, sample.state, sample.tracks, readout_s, c, job.settings.adjustment),
+                         block.cameras[c].readout_s);
+      readout_s[c] = choice.time_s;
+      reasons[i] = choice.reason;
+    }
+  return reasons;
+}
+
+// Images that say nothing of each other, such as one alone, leave every camera with what is usual. The rest of the
+// block may still say something.
+std::vector<Found> nothing_found(const Block& block, const std::vector<CameraIndex>& cameras, const std::string& why) {
   std::vector<Found> found(cameras.size());
-  std::vector<std::string> readouts(cameras.size());
-  std::vector<CameraIndex> to_choose;
-  for (const CameraIndex c : cameras)
-    if (job.block.cameras[c].choose) to_choose.push_back(c);
-  std::vector<CameraChoice> choices;
-  try {
-    const Sample sample = take_sample(job, tiles, state, rig);
-    for (std::size_t i = 0; i < cameras.size(); ++i)
-      if (const Camera& camera = job.block.cameras[cameras[i]]; camera.estimate_readout) {
-        const ReadoutChoice choice = choose_readout(
-            estimate_readout(job.block, sample.state, sample.tracks, readout_s, cameras[i], job.settings.adjustment),
-            camera.readout_s);
-        readout_s[cameras[i]] = choice.time_s;
-        readouts[i] = choice.reason;
-      }
-    if (!to_choose.empty())
-      choices = determined_parameters(job.block, sample.state, sample.tracks, to_choose, readout_s,
-                                      job.settings.adjustment, {});
-  } catch (const ComputeError& error) {
-    // Images that say nothing of each other, such as one alone. The rest of the block may still say something.
-    choices.clear();
-    for (const CameraIndex c : to_choose)
-      choices.push_back({usual_parameters(job.block.cameras[c].intrinsics.model()),
-                         fmt::format("estimated: the usual parameters; no choice: {}", error.what())});
-  }
-  for (std::size_t i = 0, chosen = 0; i < cameras.size(); ++i) {
-    if (job.block.cameras[cameras[i]].choose) found[i].choice = choices[chosen++];
-    found[i].readout_us = std::llround(1e6 * readout_s[cameras[i]]);
-    std::string& reason = found[i].choice.reason;
-    reason += (reason.empty() || readouts[i].empty() ? "" : "; ") + readouts[i];
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const Camera& camera = block.cameras[cameras[i]];
+    if (camera.choose)
+      found[i].choice = {usual_parameters(camera.intrinsics.model()),
+                         fmt::format("estimated: the usual parameters; no choice: {}", why)};
+    else
+      found[i].choice.reason = fmt::format("no rolling shutter: {}", why);
   }
   return found;
+}
+
+std::vector<Found> find(const Job& job, const Tiles& tiles, const BlockState& state, RigIndex rig,
+                        const std::vector<CameraIndex>& cameras) {
+  const Block& block = job.block;
+  std::vector<CameraIndex> to_choose;
+  for (const CameraIndex c : cameras)
+    if (block.cameras[c].choose) to_choose.push_back(c);
+  IndexedVector<CameraIndex, double> readout_s;
+  for (const Camera& camera : block.cameras) readout_s.push_back(camera.readout_s);
+  try {
+    const Sample sample = take_sample(job, tiles, state, rig);
+    const std::vector<std::string> readouts = find_readouts(job, sample, cameras, readout_s);
+    std::vector<CameraChoice> choices;
+    if (!to_choose.empty())
+      choices =
+          determined_parameters(block, sample.state, sample.tracks, to_choose, readout_s, job.settings.adjustment, {});
+    std::vector<Found> found(cameras.size());
+    for (std::size_t i = 0, chosen = 0; i < cameras.size(); ++i) {
+      if (block.cameras[cameras[i]].choose) found[i].choice = choices[chosen++];
+      found[i].readout_us = std::llround(1e6 * readout_s[cameras[i]]);
+      std::string& reason = found[i].choice.reason;
+      reason += (reason.empty() || readouts[i].empty() ? "" : "; ") + readouts[i];
+    }
+    return found;
+  } catch (const ComputeError& error) {
+    return nothing_found(block, cameras, error.what());
+  }
 }
 
 void write_found(const std::string& path, const std::vector<CameraIndex>& cameras, const std::vector<Found>& found) {
@@ -180,7 +205,7 @@ void take_found(const std::string& path, Block& block, BlockState& state) {
       take_choice(found.choice, camera, state.cameras[CameraIndex(number)]);
     else
       camera.choice = found.choice.reason;
-    camera.readout_s = 1e-6 * static_cast<double>(found.readout_us);
+    if (camera.estimate_readout) camera.readout_s = 1e-6 * static_cast<double>(found.readout_us);
   }
 }
 

@@ -157,7 +157,7 @@ std::string readout_line(const Camera& camera) {
   if (camera.readout_s == 0) return "";
   return paragraph("Rolling shutter: " + fixed(1000 * std::abs(camera.readout_s), 1) + " ms from the " +
                        (camera.readout_s > 0 ? "first row to the last" : "last row to the first") +
-                       ". Measurements are corrected for the motion in this time.",
+                       ". Measurements are corrected for the motion in this time, where the times of images tell it.",
                    "muted");
 }
 

@@ -13,6 +13,8 @@ TEST(SensorTable, FindsCamerasAsTheirHeadersNameThem) {
   EXPECT_EQ(sensor_width_mm("Canon", "Canon DIGITAL IXUS 50"), 5.75);  // 1/2.5 inch
   EXPECT_EQ(sensor_width_mm("SONY", "DSC-RX100"), 13.2);
   EXPECT_EQ(sensor_width_mm("Apple", "iPhone 6"), 4.89);
+  EXPECT_EQ(sensor_width_mm("LG Electronics", "LG-D855"), 4.8);
+  EXPECT_EQ(sensor_width_mm("NIKON", "E5700"), 8.8);
   EXPECT_EQ(sensor_width_mm("OLYMPUS IMAGING CORP.", "E-5"), 17.3);  // four thirds
 }
 

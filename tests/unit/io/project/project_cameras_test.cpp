@@ -75,6 +75,12 @@ TEST(ProjectCameras, ReadoutTimesAreThoseOfTheTableOrTheProject) {
   EXPECT_TRUE(camera("readout_ms: estimate").estimate_readout);
   EXPECT_EQ(camera("readout_ms: estimate").readout_s, 0);
   EXPECT_EQ(camera("readout_ms: 20").prior_sigma, camera("").prior_sigma);
+  const Block own = read_text(folder,
+                              "images: images\ncameras:\n  default: {readout_ms: 0}\n"
+                              "  DJI FC300S 64x48 3.61mm: {readout_ms: auto}\n")
+                        .block;
+  EXPECT_EQ(own.cameras[CameraIndex(0)].readout_s, 0.033);
+  EXPECT_TRUE(own.cameras[CameraIndex(0)].estimate_readout);
   // The images of the line have no times.
   for (const std::string value : {"20", "estimate"})
     EXPECT_THAT(read_text(folder, "images: images\ncameras: {default: {readout_ms: " + value + "}}\n").warnings,
