@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <tuple>
 
 namespace megablock {
@@ -10,7 +9,7 @@ namespace megablock {
 namespace {
 
 constexpr double kLongestLegS = 30;       // frames farther apart in time say little of the motion
-constexpr double kLongPathS = 20;         // a path of whole seconds that is this long is timed to some per cent
+constexpr double kLongPathS = 20;         // of whole seconds, half on each side: timed to some per cent
 constexpr double kSharpestTurnCos = 0.5;  // of 60 degrees
 
 bool same_line(const Frame& a, const Frame& b) { return a.rig == b.rig && a.pass == b.pass; }

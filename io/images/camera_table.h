@@ -1,10 +1,10 @@
 // Reads tables that tell a figure for each of many cameras by maker and model.
 //
 // A line is "make,model,figure" or "make,model,figure,fewest_megapixels" with plain names (letters and digits in lower
-// case); an empty make stands for any. The fourth field may also be a word, such as
-// the source of the line, which then holds for images of any size. Programs write the same camera with other spaces,
-// hyphens and capitals, so only letters and digits are compared. The model is looked up first, then with the name of
-// its maker taken off. Lines that begin with '#' are comments.
+// case); an empty make stands for any. The fourth field may also be a word, such as the source of the line, which then
+// holds for images of any size. Programs write the same camera with other spaces, hyphens and capitals, so only letters
+// and digits are compared. The model is looked up first, then with the name of its maker taken off. Lines that begin
+// with '#' are comments.
 #pragma once
 
 #include <limits>
