@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "geometry/numbers/decompositions.h"
 #include "merge/plan/unknowns.h"
@@ -169,8 +170,21 @@ ImageSpread ImageSpread::from_bytes(const Bytes& bytes) {
   return spread;
 }
 
-ImageClusters::ImageClusters(const TileProblem& problem, const TilePlan& plan, const std::vector<double>& extents)
-    : problem_(problem), plan_(plan), extents_(extents) {}
+double spread_share(std::int64_t images, std::int64_t cameras) {
+  constexpr std::int64_t kImages = 400, kImagesPerCamera = 50;
+  const std::int64_t enough = std::max(kImages, kImagesPerCamera * cameras);
+  return images <= enough ? 1 : static_cast<double>(enough) / static_cast<double>(images);
+}
+
+ImageClusters::ImageClusters(const TileProblem& problem, const TilePlan& plan, const std::vector<double>& extents,
+                             double share)
+    : problem_(problem), plan_(plan), extents_(extents) {
+  // The multiples of the golden ratio, modulo 1, are spread evenly over [0, 1), also those of every n-th image.
+  for (const TileImage& image : problem.images) {
+    const double multiple = static_cast<double>(image.image.value) * std::numbers::phi;
+    in_sample_.push_back(multiple - std::floor(multiple) < share);
+  }
+}
 
 Eigen::Index ImageClusters::Cluster::row_of(std::int64_t unknown, Eigen::Index dimension) {
   const auto [place, is_new] = rows.try_emplace(unknown, Rows{score.size(), dimension});
@@ -186,6 +200,7 @@ void ImageClusters::add_point(const PointEquations& equations, std::size_t i, do
   const PointEquations::Point& point = equations.points()[i];
   if (problem_.points[at(point.point)].role != PointRole::kTie) return;
   const auto [image, number] = field_of(problem_, extents_, point.point);
+  if (!in_sample_[at(image)]) return;
   Cluster& cluster = clusters_[image];
   Field& field = cluster.fields[number];
   field.leverage += leverage;

@@ -32,11 +32,11 @@
 // half of their errors, and C_e of each unknown by itself would be a poor estimate. One number of the block is a good
 // one: the mean over all directions of the unknowns, tr B C = sum s_c'C s_c, over its mean for independent errors,
 // sum tr P - tr P^2. The quotient of this ratio for images and that for fields, if above 1, multiplies B. It is 1
-// within a tenth for independent errors in 12 images. Cameras belong to all images, and a camera has a quotient of its
-// own for its few parameters, from their part of C s_c.
+// within a tenth for independent errors in 12 images, so that a sample of the images is enough (spread_share). Cameras
+// belong to all images, and a camera has a quotient of its own for its few parameters, from their part of C s_c.
 //
-// A pose that hangs on a handful of clusters follows their errors, and so do their scores: C_e of such a pose is far too
-// small. The mean ratio of the block, rho, is known well. So B is drawn half the way to it (Ledoit and Wolf 2004,
+// A pose that hangs on a handful of clusters follows their errors, and so do their scores: C_e of such a pose is far
+// too small. The mean ratio of the block, rho, is known well. So B is drawn half the way to it (Ledoit and Wolf 2004,
 // Journal of Multivariate Analysis 88), with S the normal matrix of the tie points:
 //
 //     B' = B / 2 + rho S / 2.
@@ -64,6 +64,10 @@ Matrix empirical_covariance(const Matrix& formal, const Matrix& with_scores) {
   return (formal - with_scores) / kScoreWeight;
 }
 
+// The share of the images of a block that tell of errors in whole images: all of a small block, at least 50 in the mean
+// for each camera.
+double spread_share(std::int64_t images, std::int64_t cameras);
+
 // From the formal covariances of the tile, whose redundancy numbers give h.
 ClusterWeights cluster_weights(const TileProblem& problem, const TileCovariance& covariance);
 
@@ -77,8 +81,8 @@ class ImageClusters {
   // The covariance of two unknowns of the cell, positions in plan.unknowns, and their dimensions.
   using CovarianceOf =
       std::function<Eigen::MatrixXd(std::int64_t a, std::int64_t rows, std::int64_t b, std::int64_t columns)>;
-  // All arguments outlive the object.
-  ImageClusters(const TileProblem& problem, const TilePlan& plan, const std::vector<double>& extents);
+  // All arguments outlive the object. `share`: of the images, chosen by their numbers in the block.
+  ImageClusters(const TileProblem& problem, const TilePlan& plan, const std::vector<double>& extents, double share);
   // After reduce(). `leverage`: tr P of the point, without its own three parameters.
   void add_point(const PointEquations& equations, std::size_t i, double leverage);
   void finish(const CovarianceOf& covariance_of, CellSpread& spread);  // of the cell; begins the next one
@@ -102,6 +106,7 @@ class ImageClusters {
   const TileProblem& problem_;
   const TilePlan& plan_;
   const std::vector<double>& extents_;
+  std::vector<bool> in_sample_;               // [images]
   std::map<std::int32_t, Cluster> clusters_;  // by image
 };
 

@@ -88,7 +88,7 @@ struct TileDatum {
   };
   std::vector<Hold> holds;
   Step columns{{}, 0, {}};                   // further right-hand sides
-  bool spread = false;                       // whether covariances come with TileCovariance::spread
+  double spread = 0;                         // share of the images from which TileCovariance::spread comes; 0: none
   const ClusterWeights* clusters = nullptr;  // of a sweep for the empirical covariances; else nullptr
 };
 
@@ -160,8 +160,9 @@ struct TileCovariance {
   std::vector<Eigen::Matrix<double, 6, 6>> aligned_frames;
   std::vector<Eigen::MatrixXd> cameras;  // [cameras] covariance of the model's parameters; zero for held ones
   std::vector<Eigen::Matrix<double, 6, 6>> mounts;  // [mounts]
-  std::vector<Eigen::Matrix3d> points;              // [points]; zero for points that take no part
-  ObservationTable observations;                    // statistics of all observations of the tile
+  // [points]; zero for points that take no part, and for tie points where TileDatum::clusters are given
+  std::vector<Eigen::Matrix3d> points;
+  ObservationTable observations;  // statistics of all observations of the tile, of those points
   // Redundancy numbers of the image observations along the image's x and y (no unit, 0 to 1;
   // io/evaluation/reliability.h), for residuals as the loss weights them: 1 - diag(J C J') / sigma^2. NaN for
   // observations that take no part. [observations]

@@ -49,9 +49,10 @@ class CellCovariances {
  public:
   // `offsets`: first row of each of plan.unknowns in `columns`.
   CellCovariances(const TileProblem& problem, const TilePlan& plan, const TileState& state, const PointTables& tables,
-                  const Step& columns, const std::vector<std::int64_t>& offsets, double own_share,
-                  const std::vector<double>* extents, TileCovariance& result)
-      : own_share_(own_share),
+                  const Step& columns, const std::vector<std::int64_t>& offsets, const TileDatum& datum,
+                  const std::vector<double>& extents, TileCovariance& result)
+      : own_share_(datum.clusters == nullptr ? 1 : 1 - kScoreWeight),
+        with_ties_(datum.clusters == nullptr),
         problem_(problem),
         plan_(plan),
         state_(state),
@@ -61,7 +62,7 @@ class CellCovariances {
         equations_(problem, state, tables),
         frame_sums_(plan.unknowns.size()),
         row_of_unknown_(plan.unknowns.size(), -1) {
-    if (extents != nullptr) images_.emplace(problem, plan, *extents);
+    if (datum.spread > 0) images_.emplace(problem, plan, extents, datum.spread);
   }
 
   // Adds the points and observations of a cell, from the covariance of its unknowns.
@@ -72,7 +73,9 @@ class CellCovariances {
     cell_rows_ = offsets.back();
     for (std::size_t i = 0; i < covariance.unknowns.size(); ++i)
       row_of_unknown_[at(find_unknown(plan_.unknowns, covariance.unknowns[i].id))] = offsets[i];
-    const std::vector<std::int32_t> points = plan_.points[cell].rows();
+    std::vector<std::int32_t> points = plan_.points[cell].rows();
+    if (!with_ties_)
+      std::erase_if(points, [this](std::int32_t p) { return problem_.points[at(p)].role == PointRole::kTie; });
     for (std::span<const std::int32_t> rest = points; !rest.empty();) {
       // The points are linearised without damping and without the curvature of the losses, as in the sweep that made
       // the factors.
@@ -254,7 +257,9 @@ class CellCovariances {
     result_.point_columns[at(equations_.points()[i].point)] = equations_.inverse_factor(i).transpose() * sum;
   }
 
+  // The own part of a point's covariance is in both C(0) and C(w). Its share w makes it part of the empirical one.
   const double own_share_;
+  const bool with_ties_;  // whether the covariances and redundancy numbers of tie points are asked for
   const TileProblem& problem_;
   const TilePlan& plan_;
   const TileState& state_;
@@ -278,15 +283,15 @@ class CellCovariances {
 class TileCovarianceBuilder {
  public:
   TileCovarianceBuilder(const TileProblem& problem, const TilePlan& plan, const TileState& state,
-                        const TileFactor& factor, const Step& columns, double own_share, bool spread)
+                        const TileFactor& factor, const Step& columns, const TileDatum& datum)
       : plan_(plan),
         factor_(factor),
         offsets_(row_offsets(plan.unknowns)),
         tables_(problem, plan, state),
         extents_(observed_extents(problem)),
-        cells_([&, this, own_share, spread] {
-          return std::make_unique<CellCovariances>(problem, plan, state, tables_, columns, offsets_, own_share,
-                                                   spread ? &extents_ : nullptr, result_);
+        cells_([&, this] {
+          return std::make_unique<CellCovariances>(problem, plan, state, tables_, columns, offsets_, datum, extents_,
+                                                   result_);
         }) {
     if (columns.columns > 1)
       result_.point_columns.assign(problem.points.size(), Eigen::MatrixXd::Zero(3, columns.columns - 1));
@@ -387,10 +392,7 @@ TileCovariance covariance_tile(const TileProblem& problem, const TilePlan& plan,
   if (factor.empty())
     return covariance_tile(problem, plan, state, condense_tile(problem, plan, state, 0, datum).factor,
                            std::move(boundary), datum, columns);
-  // The own part of a point's covariance is in both C(0) and C(w). Its share w makes it part of the empirical one.
-  const double own_share = datum.clusters == nullptr ? 1 : 1 - kScoreWeight;
-  return TileCovarianceBuilder(problem, plan, state, factor, columns, own_share, datum.spread)
-      .build(std::move(boundary));
+  return TileCovarianceBuilder(problem, plan, state, factor, columns, datum).build(std::move(boundary));
 }
 
 }  // namespace megablock

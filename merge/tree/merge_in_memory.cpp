@@ -34,7 +34,7 @@ MergeInMemory::MergeInMemory(const MergeTree& tree, std::vector<TileProblem> pro
       states_(std::move(states)),
       unknown_steps_(problems_.size()) {
   for (std::size_t t = 0; t < problems_.size(); ++t) tile_plans_.push_back(runner_.tile_plan(t));
-  runner_.expect_scores();
+  runner_.expect_scores(1);
   runner_.on_step([this](std::size_t row, const Step& step) { unknown_steps_[row] = step; });
 }
 
@@ -76,7 +76,9 @@ void MergeInMemory::final_scores() {
         change(empirical.aligned_frames, of_scores.aligned_frames);
         change(empirical.cameras, of_scores.cameras);
         change(empirical.mounts, of_scores.mounts);
-        change(empirical.points, of_scores.points);
+        for (std::size_t p = 0; p < empirical.points.size(); ++p)
+          if (problems_[t].points[p].role != PointRole::kTie)
+            empirical.points[p] = empirical_covariance(empirical.points[p], of_scores.points[p]);
       });
   for (std::size_t i = 0; i < scored.matrix.size(); ++i)
     empirical_frames_.matrix[i] = empirical_covariance(empirical_frames_.matrix[i], scored.matrix[i]);

@@ -31,6 +31,7 @@ class MergeInMemory : public TreeRunner {
   const CovarianceMatrix& frame_covariance() const { return posterior_.frames; }
   // After final_up(): the empirical covariances, by tile, and those of all frames of a small block.
   void final_scores();
+  // Those of tie points are the formal ones.
   const std::vector<TileCovariance>& empirical_covariances() const { return empirical_; }
   const CovarianceMatrix& empirical_frame_covariance() const { return empirical_frames_; }
   const std::vector<SeamReport>& seams() const { return posterior_.seams; }

@@ -79,8 +79,9 @@ class MergeTreeRunner : public TreeRunner {
   // further right-hand sides.
   void expect_posterior() { posterior_expected_ = true; }
 
-  // Says before posterior() that scored_posterior() follows it.
-  void expect_scores() { scores_expected_ = true; }
+  // Says before posterior() that scored_posterior() follows it. `share`: of the images that give Posterior::spread
+  // (spread_share of merge/tile/cluster_scores.h).
+  void expect_scores(double share) { spread_share_ = share; }
 
   // Collective, at the solution: runs a sweep up with lambda = 0, checks the seams, finds the datum and computes the
   // covariances.
@@ -195,10 +196,10 @@ class MergeTreeRunner : public TreeRunner {
   BlockGauge gauge_;
   HeldAgainstPriors held_before_;                // of the last sweep up
   std::vector<ClusterWeights> cluster_weights_;  // [tiles_] of the last posterior()
-  bool scores_expected_ = false;
-  bool with_scores_ = false;                    // the sweep adds the scores of clusters
-  DatumColumns columns_ = DatumColumns::kNone;  // the further right-hand sides of the sweep
-  UnknownList block_frames_;                    // of the whole block, where columns_ is kFrames
+  double spread_share_ = 0;                      // 0: no scored_posterior() follows
+  bool with_scores_ = false;                     // the sweep adds the scores of clusters
+  DatumColumns columns_ = DatumColumns::kNone;   // the further right-hand sides of the sweep
+  UnknownList block_frames_;                     // of the whole block, where columns_ is kFrames
   bool check_seams_ = false;
   bool posterior_expected_ = false;
   std::optional<SubtreeSums> last_sweep_;  // sums of a sweep at the present state that stored the data of the posterior

@@ -81,7 +81,7 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
       [&](const RankTile& tile, const TileCovariance& covariance) {
         tables[last] = covariance.observations;
         spreads[last] = covariance.spread;
-        if (scores_expected_) cluster_weights_[last] = cluster_weights(tile.problem, covariance);
+        if (spread_share_ > 0) cluster_weights_[last] = cluster_weights(tile.problem, covariance);
         if (visit) visit(tile, covariance);
       });
   check_seams_ = false;

@@ -30,6 +30,7 @@
 #include "io/store/job/events.h"
 #include "io/text/counted.h"
 #include "merge/checks/seam_text.h"
+#include "merge/tile/cluster_scores.h"
 #include "merge/tree/merge_tree_runner.h"
 
 namespace megablock {
@@ -172,7 +173,8 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
     runner.record_sweeps(recorder);
     return_freed_memory();  // memory from which the plans were made
     if (last) runner.expect_posterior();
-    if (last && job.settings.merge.empirical_sigmas) runner.expect_scores();
+    if (last && job.settings.merge.empirical_sigmas)
+      runner.expect_scores(spread_share(std::ssize(job.block.images), std::ssize(job.block.cameras)));
     adjust_globally(runner, options, position.global, [&](const GlobalState& state) {
       return_freed_memory();
       say_iteration(job, state, options);
