@@ -183,16 +183,14 @@ void find_least_contradicted(FocalLength& found) {
   found.focal_px = focal_at(static_cast<double>(k) + (k > 0 && k < last ? vertex(at(k - 1), at(k), at(k + 1)) : 0));
 }
 
-using Pairs = std::vector<const MatchedImages*>;
-
 // The support of the fundamental matrix of each pair after a correction by q; 0: there is none.
-std::vector<double> supports_with(double q, const Pairs& pairs, const Sensor& sensor,
+std::vector<double> supports_with(double q, const std::vector<MatchedImages>& pairs, const Sensor& sensor,
                                   const FocalLengthOptions& options) {
   std::vector<double> supports(pairs.size());
 #pragma omp parallel for schedule(dynamic, 1) num_threads(options.threads)
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const PointPairs points = corrected(pairs[i]->pixels, q, sensor);
-    const auto found = find_fundamental(points, sensor.larger_side, pairs[i]->seed, options);
+    const PointPairs points = corrected(pairs[i].pixels, q, sensor);
+    const auto found = find_fundamental(points, sensor.larger_side, pairs[i].seed, options);
     supports[i] = found ? found->consensus.score : 0;
   }
   return supports;
@@ -201,18 +199,17 @@ std::vector<double> supports_with(double q, const Pairs& pairs, const Sensor& se
 double sum_of(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
 // The first max_pairs pairs that have a fundamental matrix, with the sum of their supports without a correction.
-std::pair<Pairs, double> usable_pairs(std::span<const MatchedImages> pairs, const Sensor& sensor,
-                                      const FocalLengthOptions& options) {
+std::pair<std::vector<MatchedImages>, double> usable_pairs(std::size_t count, const MatchedBatch& pairs,
+                                                           const Sensor& sensor, const FocalLengthOptions& options) {
   const auto most = static_cast<std::size_t>(options.max_pairs);
-  Pairs usable;
+  std::vector<MatchedImages> usable;
   double sum = 0;
-  for (std::size_t first = 0; first < pairs.size() && usable.size() < most; first += most) {
-    Pairs next;
-    for (const MatchedImages& pair : pairs.subspan(first, std::min(most, pairs.size() - first))) next.push_back(&pair);
+  for (std::size_t first = 0; first < count && usable.size() < most; first += most) {
+    std::vector<MatchedImages> next = pairs(first, std::min(first + most, count));
     const std::vector<double> supports = supports_with(0, next, sensor, options);
     for (std::size_t i = 0; i < next.size() && usable.size() < most; ++i) {
       if (!(supports[i] > 0)) continue;
-      usable.push_back(next[i]);
+      usable.push_back(std::move(next[i]));
       sum += supports[i];
     }
   }
@@ -220,7 +217,7 @@ std::pair<Pairs, double> usable_pairs(std::span<const MatchedImages> pairs, cons
 }
 
 // q with the largest support. It climbs from zero, with this support, in equal steps; the support has one peak.
-double find_distortion(const Pairs& pairs, double uncorrected, const Sensor& sensor,
+double find_distortion(const std::vector<MatchedImages>& pairs, double uncorrected, const Sensor& sensor,
                        const FocalLengthOptions& options) {
   std::map<int, double> known{{0, uncorrected}};  // by number of steps
   const auto support = [&](int steps) {
@@ -245,11 +242,11 @@ void FocalLengthOptions::check() const {
     throw std::invalid_argument("min_inliers >= 8, 1 <= min_pairs <= max_pairs and threads >= 1 are needed");
 }
 
-std::optional<FocalLength> focal_length_of(std::span<const MatchedImages> pairs, int width, int height,
+std::optional<FocalLength> focal_length_of(std::size_t count, const MatchedBatch& pairs, int width, int height,
                                            const FocalLengthOptions& options) {
   options.check();
   const Sensor sensor{static_cast<double>(std::max(width, height)), 0.5 * std::hypot(width, height)};
-  const auto [usable, uncorrected] = usable_pairs(pairs, sensor, options);
+  const auto [usable, uncorrected] = usable_pairs(count, pairs, sensor, options);
   if (std::ssize(usable) < options.min_pairs) return std::nullopt;
   const double q = find_distortion(usable, uncorrected, sensor, options);
   FocalLength found;
@@ -261,8 +258,8 @@ std::optional<FocalLength> focal_length_of(std::span<const MatchedImages> pairs,
   std::vector<std::vector<double>> of_pairs(usable.size());
 #pragma omp parallel for schedule(dynamic, 1) num_threads(options.threads)
   for (std::size_t i = 0; i < usable.size(); ++i)
-    if (const auto inliers = inliers_of_fundamental(corrected(usable[i]->pixels, q, sensor), sensor.larger_side,
-                                                    usable[i]->seed, options))
+    if (const auto inliers =
+            inliers_of_fundamental(corrected(usable[i].pixels, q, sensor), sensor.larger_side, usable[i].seed, options))
       of_pairs[i] = votes_of(*inliers, focals);
   found.votes.assign(focals.size(), 0);
   for (const double focal : focals) found.grid_px.push_back(focal * sensor.larger_side);

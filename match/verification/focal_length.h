@@ -31,8 +31,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "geometry/two_view/point_pairs.h"
@@ -70,9 +70,12 @@ struct FocalLength {
   double against(double focal_px) const;
 };
 
-// Estimates the focal length of a camera from pairs of its images of `width` x `height` pixels. Empty where fewer than
-// min_pairs have enough inliers. The result is deterministic and does not depend on the threads.
-std::optional<FocalLength> focal_length_of(std::span<const MatchedImages> pairs, int width, int height,
+// Gives the pairs [first, end) of a camera. They are matched only when they are asked for.
+using MatchedBatch = std::function<std::vector<MatchedImages>(std::size_t first, std::size_t end)>;
+
+// Estimates the focal length of a camera from `count` pairs of its images of `width` x `height` pixels. Empty where
+// fewer than min_pairs have enough inliers. The result is deterministic and does not depend on the threads.
+std::optional<FocalLength> focal_length_of(std::size_t count, const MatchedBatch& pairs, int width, int height,
                                            const FocalLengthOptions& options = {});
 
 }  // namespace megablock

@@ -24,7 +24,8 @@ namespace megablock {
 
 namespace {
 
-constexpr std::size_t kMostMatched = 120;  // pairs that are matched
+constexpr std::size_t kMostMatched = 120;  // pairs that are matched at most
+constexpr int kSample = 16;                // pairs that are enough where none contradicts a focal length that is known
 constexpr std::size_t kFewestPairs = 20;   // pairs for which the first generations of a block are enough
 constexpr std::int64_t kImages = 200;      // of a camera, the first ones
 constexpr std::size_t kFeatures = 3000;    // of an image, the coarsest
@@ -137,7 +138,7 @@ PointPairs matched_pixels(const ImageFeatures& a, const ImageFeatures& b, const 
   return pixels;
 }
 
-std::optional<FocalLength> estimate(const Job& job, const Camera& camera, const std::vector<ImagePair>& pairs) {
+std::vector<MatchedImages> match_coarsest(const Job& job, const Camera& camera, std::span<const ImagePair> pairs) {
   std::set<ImageIndex> images;
   for (const ImagePair& pair : pairs) images.insert({pair.a, pair.b});
   const auto features = coarsest_features(job, images);
@@ -146,10 +147,25 @@ std::optional<FocalLength> estimate(const Job& job, const Camera& camera, const 
   for (std::size_t i = 0; i < pairs.size(); ++i)
     matched[i] = {matched_pixels(features.at(pairs[i].a), features.at(pairs[i].b), camera, job.settings.matching),
                   hash_of(pairs[i])};
+  return matched;
+}
+
+// Asks a sample of the pairs first where the focal length is known. In most blocks they agree with it.
+std::optional<FocalLength> estimate(const Job& job, const Camera& camera, const std::vector<ImagePair>& pairs) {
   FocalLengthOptions options;
   options.max_residual_px = job.settings.matching.max_residual_px;
   options.threads = job.options.threads;
-  return focal_length_of(matched, camera.width, camera.height, options);
+  const auto batch = [&](std::size_t first, std::size_t end) {
+    return match_coarsest(job, camera, std::span(pairs).subspan(first, end - first));
+  };
+  const auto ask = [&] { return focal_length_of(pairs.size(), batch, camera.width, camera.height, options); };
+  if (camera.focal_known) {
+    options.max_pairs = kSample;
+    auto found = ask();
+    if (!found || (found->asked == kSample && found->against(camera.intrinsics[kFocal]) < 1)) return found;
+    options.max_pairs = FocalLengthOptions().max_pairs;
+  }
+  return ask();
 }
 
 // What the stage says of a camera.

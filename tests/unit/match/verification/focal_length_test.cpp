@@ -67,6 +67,13 @@ PointPairs simulate(const Scene& scene, std::uint64_t seed) {
   return pairs;
 }
 
+MatchedBatch batches_of(const std::vector<MatchedImages>& pairs) {
+  return [&pairs](std::size_t first, std::size_t end) {
+    return std::vector<MatchedImages>(pairs.begin() + static_cast<std::ptrdiff_t>(first),
+                                      pairs.begin() + static_cast<std::ptrdiff_t>(end));
+  };
+}
+
 std::optional<FocalLength> found_in(const Scene& scene, std::uint64_t seed, std::size_t count = 12, int threads = 2) {
   std::vector<MatchedImages> pairs(count);
   for (std::size_t i = 0; i < count; ++i) {
@@ -75,7 +82,7 @@ std::optional<FocalLength> found_in(const Scene& scene, std::uint64_t seed, std:
   }
   FocalLengthOptions options;
   options.threads = threads;
-  return focal_length_of(pairs, kSensorWidth, kSensorHeight, options);
+  return focal_length_of(pairs.size(), batches_of(pairs), kSensorWidth, kSensorHeight, options);
 }
 
 // Within 2 %, and within four sigmas.
@@ -164,7 +171,7 @@ TEST(FocalLength, IsThatOfMostPairs) {
     scene.focal_px = i % 4 == 0 ? 2400 : 1400;
     pairs.push_back({simulate(scene, 500 + i), i});
   }
-  const auto found = focal_length_of(pairs, kSensorWidth, kSensorHeight);
+  const auto found = focal_length_of(pairs.size(), batches_of(pairs), kSensorWidth, kSensorHeight);
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->focal_px, 1400, 0.03 * 1400);
 }
