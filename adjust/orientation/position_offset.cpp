@@ -9,6 +9,7 @@
 #include "adjust/orientation/steps/control_marks.h"
 #include "geometry/numbers/median.h"
 #include "io/block/held_priors.h"
+#include "io/block/prior_differences.h"
 
 namespace megablock {
 
@@ -64,6 +65,20 @@ Eigen::Vector3d mean_centre(const std::vector<PointView>& marks) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const PointView& mark : marks) sum += mark.camera.centre;
   return sum / static_cast<double>(marks.size());
+}
+
+// "46.90 m above", "2.00 m west of and 3.00 m below".
+std::string where_of(const Eigen::Vector3d& offset) {
+  constexpr std::array<std::array<const char*, 2>, 3> kSides{
+      {{"east of", "west of"}, {"north of", "south of"}, {"above", "below"}}};
+  std::vector<std::string> parts;
+  for (int k = 0; k < 3; ++k)
+    if (offset[k] != 0)
+      parts.push_back(
+          fmt::format("{:.2f} m {}", std::abs(offset[k]), kSides[static_cast<std::size_t>(k)][offset[k] < 0 ? 1 : 0]));
+  std::string where = parts.front();
+  for (std::size_t i = 1; i < parts.size(); ++i) where += (i + 1 == parts.size() ? " and " : ", ") + parts[i];
+  return where;
 }
 
 }  // namespace
@@ -123,24 +138,46 @@ void remove_offset(const PositionOffset& offset, const std::vector<FrameIndex>& 
   }
 }
 
+PositionOffset adjusted_offset(const MovedPositions& moved, const Block& block, const BlockState& adjusted,
+                               const IndexedVector<FrameIndex, Eigen::Vector3d>& variances) {
+  PositionOffset found = moved.offset;
+  std::array<Comparison, 3> compared;
+  std::array<std::vector<double>, 3> own;
+  for (const FrameIndex frame : moved.frames) {
+    if (!has_position(block, adjusted, frame)) continue;
+    const Eigen::Vector3d d = difference(adjusted.frames[frame], *block.frames[frame].position_prior);
+    for (std::size_t k = 0; k < 3; ++k) {
+      compared[k].differences.push_back(-d[static_cast<int>(k)]);
+      own[k].push_back(variances[frame][static_cast<int>(k)]);
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    const auto axis = static_cast<std::size_t>(k);
+    Comparison& c = compared[axis];
+    if (found.offset[k] == 0 || c.differences.empty()) continue;
+    c.control_sigmas = c.views = {0};
+    const Difference d = difference_of(c, 0);
+    found.offset[k] += d.offset;
+    found.sigma[k] = std::sqrt(d.sigma * d.sigma + median(own[axis]));
+  }
+  return found;
+}
+
 std::string offset_text(const PositionOffset& found) {
-  constexpr std::array<std::array<const char*, 2>, 3> kSides{
-      {{"east of", "west of"}, {"north of", "south of"}, {"above", "below"}}};
-  std::vector<std::string> parts;
-  for (int k = 0; k < 3; ++k)
-    if (found.offset[k] != 0)
-      parts.push_back(fmt::format("{:.2f} m {}", std::abs(found.offset[k]),
-                                  kSides[static_cast<std::size_t>(k)][found.offset[k] < 0 ? 1 : 0]));
-  std::string where = parts.front();
-  for (std::size_t i = 1; i < parts.size(); ++i) where += (i + 1 == parts.size() ? " and " : ", ") + parts[i];
-  const bool of_heights = parts.size() == 1 && found.offset.z() != 0;
+  const bool of_heights = found.offset.head<2>().isZero(0);
   return fmt::format(
       "the positions lie {} the control points (sigma {:.2f} m, {} points): {}; they are moved onto the control, and "
-      "their sigmas are raised from {:.2g} to {:.2g} m, as the offset is no better known "
+      "their sigmas are raised from {:.2g} to {:.2g} m, so that they do not count the control a second time "
       "('orientation: {{move_positions_to_control: false}}' leaves them)",
-      where, found.sigma.maxCoeff(), found.points,
-      of_heights ? "ellipsoidal and orthometric heights?" : "coordinates of two systems?", found.before.maxCoeff(),
-      found.after.maxCoeff());
+      where_of(found.offset), found.sigma.maxCoeff(), found.points,
+      of_heights ? "ellipsoidal and orthometric heights, or local control about another origin?"
+                 : "coordinates of two systems?",
+      found.before.maxCoeff(), found.after.maxCoeff());
+}
+
+std::string adjusted_offset_text(const PositionOffset& found) {
+  return fmt::format("in the adjusted block the positions lie {} the control points (sigma {:.2g} m)",
+                     where_of(found.offset), found.sigma.maxCoeff());
 }
 
 }  // namespace megablock

@@ -8,7 +8,7 @@
 //     o_k = med d_ik,   d_i = X_i - G_i,   s_k = 1.4826 med |d_ik - o_k|,
 //     sigma_k^2 = 1.2533^2 max(s_k, q_k)^2 / n + (v_k sigma_f / f)^2,
 //
-// with G_i the given coordinates and q_k the median of their sigmas. The medians stand the outliers of nearly half of
+// with G_i the given coordinates and q_k the median of their sigmas. The medians tolerate outliers at nearly half of
 // the n points. v is the median vector from the cameras to the points and sigma_f / f the prior sigma of the focal
 // length: the cameras have their places from the positions, so a focal length that is 1 % too long puts the ground 1 %
 // of the flying height too low, at every point alike. A coordinate counts when it is three times its own sigma and five
@@ -24,6 +24,13 @@
 // and their information is at most a tenth of that of the control, so that sigmas of the datum are too small by 5 % at
 // most. What positions tell of one another is weakened by this; that is the price for an offset that is no unknown of
 // the adjustment.
+//
+// The adjusted block has the datum of the control, a calibrated camera, and its own differences r_fk from the N moved
+// positions. So it knows the offset better than the orientation did:
+//
+//     o_k' = o_k - med r_fk,   sigma_k'^2 = 1.2533^2 (1.4826 med |r_fk - med r_fk|)^2 / N + med v_fk,
+//
+// with v_fk the variances of the projection centres, which they have mostly in common, from the control.
 #pragma once
 
 #include <Eigen/Core>
@@ -55,5 +62,19 @@ void remove_offset(const PositionOffset& offset, const std::vector<FrameIndex>& 
 
 // "the positions lie 46.90 m above the control points (sigma 0.02 m, 6 points): ...".
 std::string offset_text(const PositionOffset& offset);
+
+// Positions that were moved onto the control together, ascending.
+struct MovedPositions {
+  PositionOffset offset;
+  std::vector<FrameIndex> frames;
+};
+
+// The offset as the adjusted block knows it. `variances`: of the projection centres, m^2. Coordinates that were not
+// moved stay zero.
+PositionOffset adjusted_offset(const MovedPositions& moved, const Block& block, const BlockState& adjusted,
+                               const IndexedVector<FrameIndex, Eigen::Vector3d>& variances);
+
+// "in the adjusted block the positions lie 46.98 m above the control points (sigma 0.02 m)".
+std::string adjusted_offset_text(const PositionOffset& offset);
 
 }  // namespace megablock

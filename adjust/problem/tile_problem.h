@@ -34,9 +34,9 @@ namespace megablock {
 struct RobustLoss {
   // Cauchy's tail: Huber's loss up to 2c, and 3c^2 + 2c^2 log(s / 4c^2) beyond; Hampel's three parts are similar. It
   // leaves good observations as they are, so that their sigmas and chi-square stay true, and ignores gross errors.
-  // Between c and 2c lie three good attitudes in a hundred. Under the logarithm they would approach the optimum only by
-  // a constant factor per step, because the cost curves downwards there and a step must not use negative curvature
-  // (merge/tile/tile_linearisation.h).
+  // Three good attitudes in a hundred have residuals between c and 2c. Under the logarithm they would approach the
+  // optimum only by a constant factor per step, because the cost curves downwards there and a step must not use
+  // negative curvature (merge/tile/tile_linearisation.h).
   enum class Kind : std::uint8_t { kNone, kHuber, kCauchy, kCauchyTail };
   Kind kind = Kind::kNone;
   double scale = 1;  // in sigmas: the corner c, or Cauchy's scale
@@ -113,8 +113,8 @@ struct TileProblem {
   };
   struct PointTerm {
     LocalPoint point;
-    Eigen::Vector3d position, sigma;
-  };  // sigma infinite: axis free
+    Eigen::Vector3d position, sigma;  // an axis of infinite sigma is free
+  };
   struct IntrinsicTerm {
     LocalCamera camera;
     Intrinsics value;

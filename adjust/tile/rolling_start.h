@@ -14,7 +14,7 @@ struct RollingShutters {
 
 // Corrects the measurements of the problem with the poses and points of `at`. Points that it does not know are
 // intersected from the measurements as they are, and then again from the corrected ones, and stand in `at` afterwards.
-// What is kept does not change.
+// The set of kept observations does not change.
 void correct_rolling_start(const RollingShutters& shutters, const AdjustOptions& options, TileProblem& problem,
                            TileState& at);
 

@@ -7,10 +7,10 @@
 
 namespace megablock {
 
-// The factors by which the sigmas of a block must be multiplied; it was adjusted with `now` times the stated sigmas.
-// The factor is 1 for kinds whose sigmas are not estimated, and for a redundancy below 30, where it would not be good
-// to 13 %. No sigma falls below the stated one, because an error that neighbouring frames share, as in trajectories,
-// hardly shows in residuals.
+// The factors by which the sigmas of a block must be multiplied. The block was adjusted with `now` times the stated
+// sigmas. The factor is 1 for kinds whose sigmas are not estimated, and for a redundancy below 30, where its own sigma
+// would be more than 13 %. No sigma falls below the stated one, because an error that neighbouring frames share, as in
+// trajectories, hardly shows in residuals.
 SigmaScales next_sigma_scales(const SigmaScales& now, const ObservationTable& table);
 
 // Multiplies the sigmas of the observations of the problem.

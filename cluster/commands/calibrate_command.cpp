@@ -39,7 +39,7 @@ void add_rig_options(CLI::App& command, CalibrationSettings& settings) {
   add_choice(command, "--mode", rig.mode, kModes, "all",
              "all: what the project has | off-line: control points | on-line: tie points");
   add_choice(command, "--mounts", rig.mounts, kMounts, "stated",
-             "stated: sigmas of the project are priors | free: all but the first, without");
+             "stated: sigmas of the project are priors | free: without priors, but the first is held");
   command.add_flag_callback(
       "--hold-intrinsics", [&rig] { rig.estimate_intrinsics = false; },
       "Cameras are held; else estimated as the project says");
@@ -77,7 +77,7 @@ void add_calibrate(CLI::App& app, std::function<int()>& action, Communicator& ra
       "         megablock calibrate --panoramic panorama.yaml -o calibration\n"
       "         megablock calibrate --compare-models job -o models\n"
       "Then: 'calibration: calibration/calibration.yaml' in the project file of any block of this rig");
-  command->add_option("project", options->project, "Project file")->required();
+  command->add_option("project", options->project, "Project file, or a job with --compare-models")->required();
   command->add_option("-o,--output", options->directory, "Folder for the calibration and its page")
       ->check(named())
       ->capture_default_str();

@@ -160,12 +160,12 @@ void add_status(CLI::App& app, Action& action) {
     bool json = false, digest = false, watch = false;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("status", "What a job has done, and its figures");
+  CLI::App* command = app.add_subcommand("status", "Show the progress and the figures of a job");
   command->footer("Example: megablock status job --json");
   command->add_option("job", options->job, "Job directory")->required();
   command->add_flag("--json", options->json, "All figures as JSON");
   command->add_flag("--digest", options->digest, "Hash of the exact bits of the result");
-  command->add_flag("--watch", options->watch, "Again every two seconds until the job is done or its run has ended");
+  command->add_flag("--watch", options->watch, "Repeat every two seconds until the job is done or its run has ended");
   command->callback([=, &action] {
     action = [options] {
       const JobStore store(options->job);
@@ -317,9 +317,10 @@ void add_evaluate(CLI::App& app, Action& action, Communicator& ranks) {
   command->add_option("job", options->run.directory, "Job directory")->required();
   auto* truth = command->add_option("truth", options->truth, "Poses: truth.csv of 'simulate', or any pose CSV");
   command
-      ->add_flag("--halves", options->halves,
-                 "Adjust the job again from two halves of its tie points, and for the camera of its images, and print "
-                 "the differences over their sigmas")
+      ->add_flag(
+          "--halves", options->halves,
+          "Adjust the job again from two halves of its tie points, then of its images for the cameras, and print "
+          "the differences over their sigmas")
       ->excludes(truth);
   command->add_option("--divisions", options->test.divisions, "Divisions of the tie points for --halves")
       ->check(CLI::Range(1, 1000))
@@ -329,7 +330,8 @@ void add_evaluate(CLI::App& app, Action& action, Communicator& ranks) {
   EvaluateOptions& of_truth = options->evaluation;
   command->add_option("--truth-sigma", of_truth.truth_position_sigma_m, "Sigma of the true positions, m per axis")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--truth-sigma-rotation", of_truth.truth_rotation_sigma_deg, "Of the true attitudes, degrees")
+  command
+      ->add_option("--truth-sigma-rotation", of_truth.truth_rotation_sigma_deg, "Sigma of the true attitudes, degrees")
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--scale-sigma", options->evaluation.scale_sigma,
                     "Multiply the posterior sigmas by the a-posteriori sigma");

@@ -156,12 +156,12 @@ void add_coplanarity(CLI::App& app, std::function<int()>& action) {
   command->add_option("job", options->job, "Job directory, with tie points")->required();
   command->add_option("-o,--output", options->output, "Pose CSV to write")->check(named())->required();
   command
-      ->add_option(
-          "--forcing", options->forcing,
-          "Weight that keeps angles and images near their start; 0: unforced, not determined unless some are held")
+      ->add_option("--forcing", options->forcing,
+                   "Weight that keeps angles and images near their start; 0: no weight; the system is singular unless "
+                   "some are held")
       ->check(not_negative())
       ->capture_default_str();
-  command->add_option("--hold", options->hold, "What keeps its start: none | angles | images")
+  command->add_option("--hold", options->hold, "What is held at its start: none | angles | images")
       ->check(CLI::IsMember({"none", "angles", "images"}))
       ->capture_default_str();
   command

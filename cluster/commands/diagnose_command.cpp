@@ -45,14 +45,14 @@ void add_diagnose(CLI::App& app, std::function<int()>& action) {
     bool json = false;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command =
-      app.add_subcommand("diagnose", "Gaps, weak links, bases and missing views of a job, also before its adjustment");
+  CLI::App* command = app.add_subcommand(
+      "diagnose", "List gaps, weak links, bases and missing images of a job, also before its adjustment");
   command->footer(
       "Example: megablock partition block.yaml -j job && megablock diagnose job\n"
       "         megablock diagnose job --json > diagnostics.json\n"
       "         megablock diagnose job --subset a.jpg,b.jpg,c.jpg --subset b.jpg,c.jpg,d.jpg");
   command->add_option("job", options->job, "Job directory")->required();
-  command->add_flag("--json", options->json, "As JSON: all that is outside what is asked, with its places");
+  command->add_flag("--json", options->json, "Print every value outside its limits, with its location, as JSON");
   command->add_option("--subset", options->subsets,
                       "Images, comma-separated: tie points that all of them share; given again, subsets are ranked");
   command->callback([=, &action] {

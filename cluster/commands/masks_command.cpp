@@ -243,8 +243,11 @@ void add_masks(CLI::App& app, std::function<int()>& action) {
       ->check(named());
   command->add_option("--min-images", r.min_images, "Images that a camera must have")->capture_default_str();
   command->add_option("--max-images", r.max_images, "Images looked at, of each camera")->capture_default_str();
-  command->add_option("--min-distance", r.min_distance_m, "Between two of them, m")->capture_default_str();
-  command->add_option("--variation", r.variation_share, "Change below which a pixel is still, over the usual one")
+  command->add_option("--min-distance", r.min_distance_m, "Least distance between two of them, m")
+      ->capture_default_str();
+  command
+      ->add_option("--variation", r.variation_share,
+                   "A pixel is masked where it changes by less than this share of the usual change")
       ->capture_default_str();
   command->add_option("--min-area", r.min_area, "Smallest region, share of the image")->capture_default_str();
   command->add_option("--margin", r.margin_px, "By which regions are widened, px of images reduced to 480")

@@ -99,7 +99,8 @@ void add_register(CLI::App& app, std::function<int()>& action, Communicator& ran
   auto options = std::make_shared<Options>();
   RegistrationSettings& s = options->settings;
   CLI::App* command = app.add_subcommand(
-      "register", "Register the passes of a trajectory with one another and adjust it jointly with what is absolute");
+      "register",
+      "Register the passes of a trajectory with one another and adjust it with positions, attitudes and control");
   command->footer(
       "Example: megablock register block.yaml -j job\n"
       "         mpirun --bind-to none -n 2 megablock register block.yaml -j job\n"

@@ -34,10 +34,11 @@ void add_note(const Job& job, JobRecord& record, const std::string& stage, const
   job.log.write(LogLevel::kWarning, stage, "", text);
 }
 
-void warn_of_damage(const JobStore& store, const JobLog& log, const std::string& unit, const std::string& problem) {
+void warn_of_damage(const JobStore& store, const JobLog& log, const std::string& stage, const std::string& unit,
+                    const std::string& problem) {
   end_progress_line();
   std::fprintf(stderr, "megablock: warning: %s: %s; it is computed again\n", store.path(unit).c_str(), problem.c_str());
-  log.write(LogLevel::kWarning, "", unit, problem + "; it is computed again");
+  log.write(LogLevel::kWarning, stage, unit, problem + "; it is computed again");
 }
 
 }  // namespace megablock

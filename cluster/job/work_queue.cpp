@@ -82,10 +82,10 @@ void write_own_record(const Job& job, const JobRecord& record) {
 
 }  // namespace
 
-bool is_current(const Job& job, const std::string& unit, std::uint64_t fingerprint) {
+bool is_current(const Job& job, const std::string& stage, const std::string& unit, std::uint64_t fingerprint) {
   std::string damage;
   const bool current = job.store.is_current(unit, fingerprint, damage);
-  if (!damage.empty()) warn_of_damage(job.store, job.log, unit, damage);
+  if (!damage.empty()) warn_of_damage(job.store, job.log, stage, unit, damage);
   return current;
 }
 
@@ -138,7 +138,7 @@ StageOutcome run_stage(const Job& job, JobRecord& record, const Stage& row, cons
       const Unit& unit = units[index];
       record.parts_done = 0;
       try {
-        if (!is_current(job, unit.name, unit.fingerprint)) {
+        if (!is_current(job, stage, unit.name, unit.fingerprint)) {
           compute_unit(job, record, stage, unit, claim_s);
           job.tables.release();
           ++mine.computed;

@@ -37,7 +37,7 @@ StageOutcome run_stage(const Job& job, JobRecord& record, const Stage& stage, co
 void part_done(const Job& job, JobRecord& record, std::int64_t parts = 1);
 
 // Whether the file of a unit exists, is undamaged and was made from the present inputs. A warning names a damaged file.
-bool is_current(const Job& job, const std::string& unit, std::uint64_t fingerprint);
+bool is_current(const Job& job, const std::string& stage, const std::string& unit, std::uint64_t fingerprint);
 
 // The first part of run_stage(), for a stage that computes its units in another way: adds the units to the record of
 // the stage, which rank 0 writes.

@@ -216,8 +216,8 @@ std::string to_text(const BlockChecks& checks, const Block& block) {
     const auto sound =
         std::count_if(checks.lines.begin(), checks.lines.end(), [](const auto& l) { return l.check.sound(); });
     text += fmt::format(
-        "check of {} flight lines: off their line by {}, steps uneven by {}; {} of them within the {} of an even "
-        "overpass\n",
+        "check of {} flight lines: off their line by {}, steps uneven by {}; {} of them below {}, as in an "
+        "overpass of a satellite\n",
         checks.lines.size(), worst([](const StripCheck& c) { return c.off_line; }),
         worst([](const StripCheck& c) { return c.uneven; }), sound, StripCheck::kLimit);
   }
@@ -231,9 +231,8 @@ std::string to_text(const BlockChecks& checks, const Block& block) {
   if (checks.subsets) {
     const SubsetCheck& s = *checks.subsets;
     text += fmt::format(
-        "check by {} subsets of the tie points: attitudes {:.2g} degrees apart, images of a point {:.2g} px; sigma of "
-        "the "
-        "attitudes {:.2g} degrees",
+        "check by {} subsets of the tie points: attitudes {:.2g} degrees apart, projections of a point {:.2g} px "
+        "apart; sigma of the attitudes {:.2g} degrees",
         s.subsets, s.rotation_spread_rad * kDegreesPerRadian, s.image_spread_px,
         s.rotation_sigma_rad() * kDegreesPerRadian);
     if (s.common_sigma_rad > 0)

@@ -79,7 +79,7 @@ std::optional<Block> previous_block(const JobStore& store, const JobLog& log) {
   if (!std::filesystem::exists(store.path("block.h5"))) return std::nullopt;
   const std::string damage = store.problem("block.h5");
   if (damage.empty()) return read_block(store.path("block.h5"));
-  warn_of_damage(store, log, "block.h5", damage);
+  warn_of_damage(store, log, "", "block.h5", damage);
   return std::nullopt;
 }
 

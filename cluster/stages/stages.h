@@ -13,7 +13,7 @@
 
 namespace megablock {
 
-// Each member is written once, by the stage that is named; the data themselves stay in the store of the job.
+// Each member is written by the stage that is named; the data themselves stay in the store of the job.
 struct StageResults {
   explicit StageResults(JobBlock& of_job) : own(of_job) {}
 
@@ -22,7 +22,7 @@ struct StageResults {
   bool needs_tiles = true;            // before all stages: a block without verified matches ends the run
   FeatureStage features;              // features
   CandidateGraph candidates;          // candidates
-  std::vector<std::string> matches;   // matching: units by cell
+  std::vector<std::string> matches;   // matching: units by cell; false_pairs replaces those without pairs that it drops
   Tiles tiles;                        // tiles
   std::vector<std::string> tracks;    // tracks: units by tile
   OrientationStage oriented;          // orientation

@@ -7,8 +7,8 @@
 
 namespace megablock {
 
-// From the first row to the last, seconds. `make` and `model` are those of EXIF; some cameras read images of more pixels
-// more slowly. Empty if the table does not have the camera.
+// From the first row to the last, seconds. `make` and `model` are those of EXIF. Some cameras read images of more
+// pixels more slowly. Empty if the table does not have the camera.
 std::optional<double> readout_time_s(const std::string& make, const std::string& model, double megapixels);
 
 }  // namespace megablock

@@ -2,6 +2,7 @@
 // found.
 #include "io/project/project_init.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
@@ -12,6 +13,7 @@
 #include "io/base/file_error.h"
 #include "io/project/input_search.h"
 #include "io/project/project.h"
+#include "io/text/counted.h"
 
 namespace megablock {
 
@@ -123,6 +125,14 @@ std::string found_text(const Project& project) {
   return text.str();
 }
 
+std::string control_text(const std::vector<ControlPoint>& points) {
+  const auto checks = std::ranges::count(points, PointRole::kCheck, &ControlPoint::role);
+  const auto controls = std::ssize(points) - checks;
+  std::string text = counted(controls, "control point");
+  if (checks > 0) text += " and " + counted(checks, "check point");
+  return text;
+}
+
 std::string summary(const Project& project, const std::vector<Candidate>& candidates, const fs::path& folder,
                     const std::string& output) {
   std::int64_t positions = 0, attitudes = 0;
@@ -134,7 +144,7 @@ std::string summary(const Project& project, const std::vector<Candidate>& candid
   text << output << ": " << project.block.images.size() << " images of " << project.block.cameras.size()
        << (project.block.cameras.size() == 1 ? " camera, " : " cameras, ") << positions << " with a position, "
        << attitudes << " with angles";
-  if (!project.block.control_points.empty()) text << ", " << project.block.control_points.size() << " control points";
+  if (!project.block.control_points.empty()) text << ", " << control_text(project.block.control_points);
   if (!project.unreadable.empty()) text << ", " << project.unreadable.size() << " unreadable files left out";
   text << ".";
   for (const std::string& line : project.found) text << "\n" << line;

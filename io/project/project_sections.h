@@ -49,7 +49,7 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
 // Warns if the origin or a control point is more than 50 km (and more than a tenth of the block's extent) away from the
 // images.
 void warn_of_distant_places(Project& project);
-// Warns of cameras with a `readout_ms` of the project whose images have no times, because their motion is not known then.
+// Warns of cameras with a `readout_ms` of the project whose images have no times. Their motion is not known then.
 void warn_of_unknown_motion(Project& project);
 
 }  // namespace megablock

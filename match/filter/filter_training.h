@@ -19,8 +19,8 @@ struct LabelledMatch {
 
 // Returns at most one match from each track: a pair of observations of different frames, as matching would find it,
 // whose images the trajectory relates. `wrong` has one element per observation: 0 for a right one, otherwise the kind
-// of the mistake (Verdict in simulate.h). A match is wrong when one of its observations is, or when both show an object
-// that moved between the frames. Throws InputError where `wrong` has the wrong length.
+// of the mistake (Verdict in io/simulate/scene/simulated_block.h). A match is wrong when one of its observations is, or
+// when both show an object that moved between the frames. Throws InputError where `wrong` has the wrong length.
 std::vector<LabelledMatch> labelled_matches(const Block& block, const TrackSet& tracks,
                                             const std::vector<std::uint8_t>& wrong, const TrustOptions& trust,
                                             std::uint64_t seed);

@@ -17,9 +17,9 @@
 // * one standard error of the raise (Breiman et al. 1984), from its scatter over the groups of images, and
 // * the share `least_gain` of sum e_g. What is left out then has a root mean square of sqrt(least_gain) of the noise of
 //   an image coordinate. Photographs have errors of this size that no parameter describes (keypoints that lie
-//   differently on surfaces seen from another side, residues of a correction by the maker). A parameter that takes them
-//   up draws with it what it is correlated with, and poses. Errors of single images cancel each other less in fewer
-//   images, so with n < `groups` images the share is groups / n times as large.
+//   differently on surfaces seen from another side, residues of a correction by the maker). A parameter that
+//   absorbs them distorts the parameters correlated with it, and the poses. Errors of single images cancel each other
+//   less in fewer images, so with n < `groups` images the share is groups / n times as large.
 //
 // So no choice predicts left-out images worse than all parameters would, beyond that limit. How well the block
 // determines a parameter, and with what it is correlated, is part of e_g, because k_g scatters accordingly.

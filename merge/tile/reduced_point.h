@@ -8,7 +8,7 @@ namespace megablock {
 
 class ReducedPoint {
  public:
-  // Of point i of the present batch, after reduce(). `equations` outlives the object.
+  // Takes point i of the present batch; call it after reduce(). `equations` outlives the object.
   ReducedPoint(const PointEquations& equations, std::size_t i) : equations_(equations), i_(i) {
     equations.blocks(i, blocks_);
   }

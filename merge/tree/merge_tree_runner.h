@@ -41,7 +41,7 @@
 
 namespace megablock {
 
-// Wall clock of this rank in all sweeps up and down, seconds.
+// Wall clock of this rank in the sweeps up and down of the iterations, seconds; those of the posterior do not count.
 struct SweepSeconds {
   double tiles = 0;   // work on its tiles
   double fronts = 0;  // work on the fronts of inner nodes

@@ -8,8 +8,8 @@
 // (front_covariance.cpp). The covariances of a tile are not kept after its visit, so that those of the whole block are
 // never in memory together.
 //
-// The empirical covariances need a second sweep up and down, with the scores of the clusters. What whole
-// images tell of them is found in the first sweep down (cluster_scores.h).
+// The empirical covariances need a second sweep up and down, with the scores of the clusters. The first sweep down
+// computes the contribution of whole images (cluster_scores.h).
 #include <algorithm>
 #include <utility>
 
@@ -57,6 +57,7 @@ void MergeTreeRunner::covariances_down(const VisitTileCovariance& before, const 
 
 MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& visit) {
   Posterior posterior;
+  const SweepSeconds of_iterations = seconds_;
   check_seams_ = true;
   if (last_sweep_) {
     posterior.sums = *std::exchange(last_sweep_, std::nullopt);
@@ -108,12 +109,14 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
   }
   std::sort(posterior.seams.begin(), posterior.seams.end(),
             [](const SeamReport& a, const SeamReport& b) { return a.node < b.node; });
+  seconds_ = of_iterations;
   return posterior;
 }
 
 // Nothing is recorded of this sweep: a killed run repeats the posterior from its beginning.
 CovarianceMatrix MergeTreeRunner::scored_posterior(const VisitCovariance& visit) {
   SweepRecorder* const recorder = std::exchange(recorder_, nullptr);
+  const SweepSeconds of_iterations = seconds_;
   with_scores_ = true;
   CovarianceMatrix frames = frame_covariance_of_small_block();
   if (gauge_.free()) columns_ = DatumColumns::kSimilarities;
@@ -121,6 +124,7 @@ CovarianceMatrix MergeTreeRunner::scored_posterior(const VisitCovariance& visit)
   covariances_down([](std::size_t, const NodeFactors&, const CovarianceMatrix&) {}, visit);
   columns_ = DatumColumns::kNone;
   with_scores_ = false;
+  seconds_ = of_iterations;
   recorder_ = recorder;
   return frames;
 }

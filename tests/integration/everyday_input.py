@@ -86,6 +86,12 @@ class EverydayInput(CopyOfTheBlock):
         # The focal length is a prior at this time, and moves the ground as an offset of the heights does.
         self.assertLess(abs(float(found[1]) - 47), 3 * float(found[2]))
         self.assertLess(float(found[2]), 5)
+        adjusted = re.search(r"in the adjusted block the positions lie ([0-9.]+) m above the control points "
+                             r"\(sigma ([0-9.]+) m\)", " ".join(state["notes"]))
+        self.assertIsNotNone(adjusted, state["notes"])
+        self.assertLess(abs(float(adjusted[1]) - 47), 0.1)
+        self.assertLess(abs(float(adjusted[1]) - 47), 3 * float(adjusted[2]) + 0.005)
+        self.assertLess(float(adjusted[2]), 0.1)
         self.assertGreaterEqual(state["check_points"]["compared"], 1)
         self.assertLess(state["check_points"]["normalised_error"], 3)
         self.assertLess(state["check_points"]["rms_vertical_m"], 0.2)

@@ -1,4 +1,4 @@
-// The control points as the oriented images see them: the rays of their marks, and where these meet.
+// Gives the rays of the marks of a control point in the oriented images, and intersects them.
 #pragma once
 
 #include <optional>

@@ -268,10 +268,22 @@ std::vector<StageStatistics> statistics_of(const Job& job, const JobRecord& reco
   return statistics;
 }
 
+// Says how far positions that were moved onto the control lie off it.
+void tell_of_moved(const Job& job, JobRecord& record, const std::vector<MovedPositions>& all,
+                   const MergeOutcome& outcome) {
+  const auto& covariances =
+      job.settings.merge.empirical_sigmas ? outcome.empirical.frame_covariance : outcome.formal.frame_covariance;
+  IndexedVector<FrameIndex, Eigen::Vector3d> variances;
+  for (const auto& covariance : covariances) variances.push_back(covariance.diagonal().tail<3>());
+  for (const MovedPositions& moved : all)
+    add_note(job, record, kMergeStage,
+             adjusted_offset_text(adjusted_offset(moved, job.block, outcome.state, variances)));
+}
+
 void write_final(const Job& job, JobRecord& record, JobBlock& own, const MergeInputs& inputs,
-                 const std::map<FrameIndex, std::string>& not_oriented, std::uint64_t fingerprint,
-                 const Adjusted& adjusted, const std::string& reason, MergeOutcome outcome,
-                 const std::vector<TilePart>& parts, UnitEvent& event) {
+                 const OrientationStage& oriented, std::uint64_t fingerprint, const Adjusted& adjusted,
+                 const std::string& reason, MergeOutcome outcome, const std::vector<TilePart>& parts,
+                 UnitEvent& event) {
   if (!reason.empty()) {
     record.notes.push_back(reason);
     warn(job, kMergeStage, reason);
@@ -287,8 +299,10 @@ void write_final(const Job& job, JobRecord& record, JobBlock& own, const MergeIn
     record.notes.push_back(line);
     say(job, kMergeStage, line);
   }
+  if (!oriented.moved.empty()) tell_of_moved(job, record, oriented.moved, outcome);
   job.tables.release();  // frames
-  BlockResult result = assemble_result(job, record, own.block, inputs.tiles, not_oriented, std::move(outcome), parts);
+  BlockResult result =
+      assemble_result(job, record, own.block, inputs.tiles, oriented.not_oriented, std::move(outcome), parts);
   if (!reason.empty()) result.failures.push_back({kMergeStage, kResult, reason});
   result.stages = statistics_of(job, record, event);
   std::vector<PartTracks::File> files;
@@ -309,7 +323,7 @@ void run_merge(const Stage& stage, const Job& job, JobRecord& record, JobBlock& 
   const std::string before = shortfall_before(job);
   begin_stage(job, record, stage, {{kResult, fingerprint, 0, nullptr}});
   const std::string current = on_first_rank(job.ranks, [&]() -> std::string {
-    if (!is_current(job, kResult, fingerprint)) return "";
+    if (!is_current(job, kMergeStage, kResult, fingerprint)) return "";
     return std::filesystem::exists(job.store.path(kReportPage)) ? "current" : "";
   });
   if (!current.empty()) {  // a run that was killed after its result may have left checkpoints
@@ -333,7 +347,7 @@ void run_merge(const Stage& stage, const Job& job, JobRecord& record, JobBlock& 
   event.seconds = monotonic_seconds() - start;
   on_first_rank(job.ranks, [&] {
     restore_names(job.store, own);
-    write_final(job, record, own, inputs, oriented.not_oriented, fingerprint, adjusted, reason,
+    write_final(job, record, own, inputs, oriented, fingerprint, adjusted, reason,
                 make_outcome(job, adjusted, inputs.tiles), parts, event);
     // The result could not yet contain the peak memory of its own writing.
     event.peak_rss_mib = std::max(event.peak_rss_mib, peak_rss_mib());

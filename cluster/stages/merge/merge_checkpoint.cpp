@@ -126,7 +126,7 @@ std::optional<MergePosition> MergeCheckpoint::find() {
       if (valid)
         for (const auto& file : std::filesystem::directory_iterator(job_.store.path(name))) {
           const std::string unit = name + "/" + file.path().filename().string(), problem = job_.store.problem(unit);
-          if (!problem.empty()) warn_of_damage(job_.store, job_.log, unit, problem);
+          if (!problem.empty()) warn_of_damage(job_.store, job_.log, kMergeStage, unit, problem);
           valid = valid && problem.empty();
         }
       if (valid)

@@ -59,7 +59,8 @@ std::vector<ImageFeatures> features_to_keep(const Job& job, const std::string& n
   for (std::size_t count = fingerprints.size() - 1; count > 0; --count) {
     const std::uint64_t fingerprint = shard_fingerprint({fingerprints.begin(), fingerprints.begin() + count});
     if (job.store.up_to_date(name, fingerprint))
-      return is_current(job, name, fingerprint) ? read_features(job.store.path(name)) : std::vector<ImageFeatures>();
+      return is_current(job, kFeatureStage, name, fingerprint) ? read_features(job.store.path(name))
+                                                               : std::vector<ImageFeatures>();
   }
   return {};
 }

@@ -192,13 +192,4 @@ std::vector<std::string> run_matching(const Stage& stage, const Job& job, JobRec
   return names;
 }
 
-std::vector<VerifiedPair> read_all_matches(const Job& job, const std::vector<std::string>& matches) {
-  std::vector<VerifiedPair> all;
-  for (const std::string& name : matches) {
-    std::vector<VerifiedPair> cell = read_matches(job.store.verified_path(name));
-    std::move(cell.begin(), cell.end(), std::back_inserter(all));
-  }
-  return all;
-}
-
 }  // namespace megablock

@@ -12,11 +12,8 @@
 
 namespace megablock {
 
-// Collective. Returns the unit names.
+// Collective: all ranks call it together. Returns the unit names.
 std::vector<std::string> run_matching(const Stage& stage, const Job& job, JobRecord& record,
                                       const FeatureStage& features, const CandidateGraph& graph);
-
-// Reads all matches of the units, in the order of the units.
-std::vector<VerifiedPair> read_all_matches(const Job& job, const std::vector<std::string>& matches);
 
 }  // namespace megablock

@@ -13,7 +13,6 @@
 #include "adjust/orientation/control_alignment.h"
 #include "adjust/orientation/given_trajectories.h"
 #include "adjust/orientation/orientation.h"
-#include "adjust/orientation/position_offset.h"
 #include "adjust/orientation/vertical_check.h"
 #include "cluster/job/messages.h"
 #include "cluster/job/work_queue.h"
@@ -234,11 +233,13 @@ void align_part(const Stage& stage, const Job& job, JobRecord& record, const std
 }
 
 // Moves the parts of the block onto the control points: those without positions by a similarity, and those whose
-// positions contradict the control by one offset, together with these positions.
-void move_onto_control(const Stage& stage, const Job& job, JobRecord& record, DisjointSets& sets, Block& own,
-                       BlockState& state) {
+// positions contradict the control by one offset, together with these positions, which are returned.
+std::vector<MovedPositions> move_onto_control(const Stage& stage, const Job& job, JobRecord& record, DisjointSets& sets,
+                                              Block& own, BlockState& state) {
   const Block& block = job.block;
-  if (std::ranges::none_of(block.control_points, [](const auto& p) { return p.role == PointRole::kControl; })) return;
+  std::vector<MovedPositions> moved;
+  if (std::ranges::none_of(block.control_points, [](const auto& p) { return p.role == PointRole::kControl; }))
+    return moved;
   std::map<std::int64_t, std::vector<FrameIndex>> parts;
   std::set<std::int64_t> with_positions, with_given_poses;
   for (FrameIndex f(0); block.frames.contains(f); ++f.value) {
@@ -258,8 +259,10 @@ void move_onto_control(const Stage& stage, const Job& job, JobRecord& record, Di
       if (!offset) continue;
       remove_offset(*offset, frames, own.frames, state);
       add_note(job, record, stage.name, offset_text(*offset));
+      moved.push_back({*offset, frames});
     }
   }
+  return moved;
 }
 
 }  // namespace
@@ -274,7 +277,7 @@ OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& 
   if (std::all_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; })) {
     if (job.is_first_rank()) remove_record(job.store, stage.name);  // an earlier run may have needed the stage
     tell_of_verticals(stage, job, record, aside, all);
-    return {given_orientation(stage, job, std::move(start)), {}};
+    return {given_orientation(stage, job, std::move(start)), {}, {}};
   }
   if (matches.empty())
     throw AgreedError<InputError>(
@@ -314,7 +317,7 @@ OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& 
   }
   tell_of_verticals(stage, job, record, aside, all);
   state = held_in_place(job, grow(state, job.block));
-  move_onto_control(stage, job, record, connected, own, state);
+  made.moved = move_onto_control(stage, job, record, connected, own, state);
   return made;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "adjust/orientation/position_offset.h"
 #include "cluster/job/job.h"
 #include "cluster/job/job_record.h"
 #include "cluster/job/stage.h"
@@ -14,6 +15,7 @@ namespace megablock {
 struct OrientationStage {
   BlockState state;
   std::map<FrameIndex, std::string> not_oriented;  // frames without a pose, and why
+  std::vector<MovedPositions> moved;               // onto the control, by part of the block
 };
 
 // Collective. `own` is the job's block. Verticals that are set aside leave it, and positions with an offset from the

@@ -76,7 +76,7 @@ std::vector<std::string> run_tracks_unit(const Stage& stage, const Job& job, Job
     std::size_t t = 0;
     tracks_by_tile([&](const TrackSet& tracks) {
       const std::uint64_t fingerprint = content_fingerprint(stage, tracks);
-      if (!is_current(job, names[t], fingerprint))
+      if (!is_current(job, stage.name, names[t], fingerprint))
         job.store.write(names[t], fingerprint, [&](const std::string& p) { write_tracks(p, tracks); });
       out << names[t++] << ' ' << hex(fingerprint) << '\n';
       return_freed_memory();
@@ -244,7 +244,7 @@ std::vector<std::string> run_given_tracks(const Stage& stage, const Job& job, Jo
 
 void index_measurements(const Job& job, const std::vector<std::string>& tracks) {
   const std::string damage = on_first_rank(job.ranks, [&] { return update_measurement_index(job.store, tracks); });
-  if (!damage.empty() && job.is_first_rank()) warn_of_damage(job.store, job.log, kMeasurementIndex, damage);
+  if (!damage.empty() && job.is_first_rank()) warn_of_damage(job.store, job.log, "tracks", kMeasurementIndex, damage);
 }
 
 }  // namespace megablock

@@ -303,19 +303,24 @@ RegisteredTrajectory run_trajectory(const Job& job, JobRecord& record, const Tra
   return read_trajectory(job.store.verified_path(kTrajectory));
 }
 
-// A reason without its numbers, so that equal reasons can be counted.
-std::string kind_of(const std::string& reason) {
-  constexpr const char* kNumber = "…";
-  std::string kind;
-  bool number = false;
-  for (const char c : reason) {
-    const bool digit = std::isdigit(static_cast<unsigned char>(c)) || (number && c == '.');
-    if (!digit) kind += c;
-    if (digit && !number) kind += kNumber;
-    number = digit;
+// Counts reasons that differ in their numbers alone together. The first one stands for all.
+class ReasonCounts {
+ public:
+  void add(const std::string& reason) {
+    std::string kind = reason;
+    std::erase_if(kind, [](unsigned char c) { return std::isdigit(c) || c == '.'; });
+    const auto [place, is_new] = counts_.try_emplace(kind, reason, 0);
+    ++place->second.second;
   }
-  return kind;
-}
+  RegistrationSummary::Reasons take() const {
+    RegistrationSummary::Reasons all;
+    for (const auto& [kind, count] : counts_) all.push_back(count);
+    return all;
+  }
+
+ private:
+  std::map<std::string, std::pair<std::string, std::int64_t>> counts_;
+};
 
 // Notes a datum that nothing fixes: the trajectory then stays about where it was.
 void note_free_position(const JointInput& input, const RegisteredTrajectory& registered,
@@ -339,18 +344,18 @@ RegistrationSummary summarise(const Job& job, const JobRecord& record, const Tra
   s.places = std::ssize(rows);
   s.resections = registered.resections;
   s.points = std::ssize(registered.points);
-  std::map<std::string, std::int64_t> reasons, not_resected;
-  for (const std::string& reason : registered.not_resected) ++not_resected[kind_of(reason)];
-  s.not_resected.assign(not_resected.begin(), not_resected.end());
+  ReasonCounts refusals, not_resected;
+  for (const std::string& reason : registered.not_resected) not_resected.add(reason);
+  s.not_resected = not_resected.take();
   std::set<std::pair<FrameIndex, FrameIndex>> different;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     s.accepted += rows[i].registration.accepted;
     if (rows[i].registration.accepted) different.emplace(rows[i].place.a, rows[i].place.c);
     s.used += registered.weight[i] >= kHolds;
-    if (!rows[i].registration.accepted) ++reasons[kind_of(rows[i].registration.reason)];
+    if (!rows[i].registration.accepted) refusals.add(rows[i].registration.reason);
   }
   s.different = std::ssize(different);
-  s.refusals.assign(reasons.begin(), reasons.end());
+  s.refusals = refusals.take();
   std::vector<double> moves;
   for (std::size_t f = 0; f < registered.frames.size(); ++f)
     moves.push_back((registered.frames[f].centre - trajectory.input.start[f].centre).norm());
@@ -410,10 +415,13 @@ std::string to_text(const RegistrationSummary& s) {
       "places                {}, registered {} (on {} different pairs of frames), of these {} hold in the joint "
       "adjustment\n",
       s.frames, s.chain, s.rig, s.places, s.accepted, s.different, s.used);
-  for (const auto& [reason, count] : s.refusals) text += fmt::format("  refused             {}: {}\n", count, reason);
+  const auto say = [&](const char* what, const RegistrationSummary::Reasons& reasons) {
+    for (const auto& [reason, count] : reasons)
+      text += fmt::format("  {:<20}{}: {}{}\n", what, count, count > 1 ? "for example, " : "", reason);
+  };
+  say("refused", s.refusals);
   text += fmt::format("resections            {}\n", s.resections);
-  for (const auto& [reason, count] : s.not_resected)
-    text += fmt::format("  refused             {}: {}\n", count, reason);
+  say("refused", s.not_resected);
   text += fmt::format("control measured      {} points\n", s.points);
   text += fmt::format("frames moved by       median {:.3f} m, largest {:.3f} m\n", s.median_move_m, s.largest_move_m);
   if (!s.check_points.empty())

@@ -42,8 +42,8 @@ struct TrackSource {
 struct RegistrationSummary {
   std::int64_t frames = 0, chain = 0, places = 0, accepted = 0, different = 0, used = 0, resections = 0, points = 0;
   std::string rig;  // the outcome for cameras and mounts, in words
-  using Reasons =
-      std::vector<std::pair<std::string, std::int64_t>>;  // the reason without its numbers, and how often it occurs
+  // The first of the reasons that differ in their numbers alone, and how many there are.
+  using Reasons = std::vector<std::pair<std::string, std::int64_t>>;
   Reasons refusals, not_resected;
   double median_move_m = 0, largest_move_m = 0;  // movements of frames from the start
   std::vector<std::string> check_points;         // one line each

@@ -39,8 +39,8 @@ class Scene {
   // The road surface at a place in plan. Empty where there is no road.
   virtual std::optional<SurfacePoint> road(const Eigen::Vector2d&) const { return std::nullopt; }
 
-  // The place that wrong matches which agree with one another show instead of the point: a place beside it (repeated
-  // facade), or one that moves (vehicle).
+  // Where wrong matches that agree with one another locate the point: beside it (repeated facade), or where it moves
+  // (vehicle).
   struct Mistake {
     Eigen::Vector3d offset = Eigen::Vector3d::Zero();    // metres
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // metres per second

@@ -244,7 +244,7 @@ class Hdf5Reader {
   // Type of fixed-length strings; throws for others.
   Hdf5Handle text_type(std::int64_t set, const std::string& name) const;
   void scalar_attribute(const std::string& object, const std::string& name, ElementType type, void* value) const;
-  // Number of values of a dataset; throws if it has not the expected shape.
+  // Number of values of a dataset; throws if it does not have the expected shape.
   std::size_t checked_size(const std::string& name, const std::vector<std::int64_t>& expected) const;
   std::int64_t checked(std::int64_t result, const std::string& name) const;
 

@@ -110,6 +110,23 @@ TEST(PositionOffset, IsRemovedFromPositionsAndBlock) {
   EXPECT_FALSE(block.find());
 }
 
+// The orientation was wrong by 0.3 m; the adjusted block is where the control is, with 1 cm.
+TEST(PositionOffset, IsBetterKnownOfTheAdjustedBlock) {
+  OffsetBlock block({0, 0, 46.9}, 0.02);
+  MovedPositions moved{{}, block.frames};
+  moved.offset.offset.z() = 47.2;
+  remove_offset(moved.offset, block.frames, block.block.frames, block.state);
+  const IndexedVector<FrameIndex, Eigen::Vector3d> variances(block.frames.size(), Eigen::Vector3d::Constant(1e-4));
+  const PositionOffset found = adjusted_offset(moved, block.block, block.truth, variances);
+  EXPECT_EQ(found.offset.head<2>(), Eigen::Vector2d::Zero());
+  // Forty positions of 2 cm: the median has 4 mm.
+  EXPECT_NEAR(found.offset.z(), 46.9, 0.012);
+  EXPECT_NEAR(found.sigma.z(), std::hypot(0.01, 0.004), 0.001);
+  EXPECT_THAT(adjusted_offset_text(found),
+              testing::MatchesRegex("in the adjusted block the positions lie 46.[0-9]* m above the control points "
+                                    "[(]sigma 0.01[0-9]* m[)]"));
+}
+
 TEST(PositionOffset, IsSaidInWords) {
   PositionOffset found;
   found.offset = {0, 0, 46.9};
@@ -119,7 +136,8 @@ TEST(PositionOffset, IsSaidInWords) {
   found.points = 6;
   EXPECT_THAT(offset_text(found),
               testing::StartsWith("the positions lie 46.90 m above the control points (sigma 0.01 m, "
-                                  "6 points): ellipsoidal and orthometric heights?"));
+                                  "6 points): ellipsoidal and orthometric heights, or "
+                                  "local control about another origin?"));
   found.offset = {-2, 1.5, -3};
   EXPECT_THAT(offset_text(found),
               testing::StartsWith("the positions lie 2.00 m west of, 1.50 m north of and 3.00 m below the control"));

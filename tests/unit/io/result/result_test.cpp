@@ -37,7 +37,9 @@ BlockResult example_result() {
   result.tiles.component.assign(4, 0);
   result.tiles.tree.nodes = {{-1, -1, -1, TileIndex(0), 0}};
   for (int f = 0; f < 4; ++f) result.frame_covariance.push_back(symmetric<BlockResult::Matrix6>(f + 1));
-  for (int c = 0; c < 2; ++c) result.camera_covariance.push_back(symmetric<Eigen::Matrix<double, 8, 8>>(c + 0.5));
+  for (const Intrinsics& camera : result.state.cameras)
+    result.camera_covariance.push_back(
+        symmetric<Eigen::Matrix<double, 16, 16>>(0.5).topLeftCorner(camera.size(), camera.size()));
   result.mount_covariance.push_back({BlockResult::Matrix6::Zero(), symmetric<BlockResult::Matrix6>(0.1)});
   result.mount_covariance.push_back({BlockResult::Matrix6::Zero()});
   for (int f = 0; f < 4; ++f) result.aligned_covariance.push_back(symmetric<BlockResult::Matrix6>(f + 3));

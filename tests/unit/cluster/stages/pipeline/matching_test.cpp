@@ -13,11 +13,19 @@
 #include "cluster/stages/merge/merge_checkpoint.h"
 #include "cluster/terminal/option_checks.h"
 #include "io/store/units/features_file.h"
+#include "io/store/units/graph_files.h"
 #include "tests/support/adjust/seen_verticals.h"
 #include "tests/support/io/scratch_directory.h"
 
 namespace megablock {
 namespace {
+
+std::vector<VerifiedPair> read_all_matches(const JobStore& store, const std::vector<std::string>& units) {
+  std::vector<VerifiedPair> all;
+  for (const std::string& unit : units)
+    for (VerifiedPair& pair : read_matches(store.verified_path(unit))) all.push_back(std::move(pair));
+  return all;
+}
 
 constexpr std::int64_t kImages = 4;
 constexpr int kRivals = 100;
@@ -108,7 +116,7 @@ CellMatches matches_of(const Block& block, const std::vector<ImageFeatures>& fea
   const std::vector<std::string> names =
       run_matching(*find_stage("matching"), job, record, {std::vector<std::uint64_t>(kImages, 7), {shard}}, graph);
   const UnitSeal seal = store.seal(names.at(0)).value();
-  return {seal.fingerprint, seal.content_hash, read_all_matches(job, names)};
+  return {seal.fingerprint, seal.content_hash, read_all_matches(store, names)};
 }
 
 void expect_same(const CellMatches& a, const CellMatches& b) {
