@@ -2,6 +2,7 @@
 // override them.
 #include "io/project/project.h"
 
+#include <fmt/core.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -93,6 +94,18 @@ std::vector<std::string> names_left_out(const Project& project) {
   return names;
 }
 
+// Local control has an origin of its own, which its file does not name.
+void warn_of_local_control(const YamlReader& top, const ControlTable& control, Project& project) {
+  const GroundFrame& ground = project.block.ground;
+  const std::vector<std::string> keys = top.keys();
+  if (control.crs != "local" || !ground.georeferenced || std::ranges::find(keys, "origin") != keys.end()) return;
+  project.warnings.push_back(
+      fmt::format("the coordinates of the control are local, and the project names no origin: they are taken about "
+                  "latitude {:.7g}, longitude {:.7g}, height {:.0f} m, a place among the positions; write their own "
+                  "origin into 'origin: [latitude, longitude, height]'",
+                  ground.latitude_deg, ground.longitude_deg, ground.height_m));
+}
+
 // Reads the keys that name files or change the block, in the order in which they depend on each other: images make
 // cameras and frames; rigs join frames; a calibration needs cameras and mounts. Poses and control are read before the
 // positions, because they may give the origin, but are added after them: only then is the ground frame known. Attitudes
@@ -149,7 +162,10 @@ void read_block_sections(YamlReader& top, Project& project, const std::vector<Se
   read_positions(top, scanned, from_files, others, ground, project);
   read_attitudes(top, scanned, project);
   if (poses) set_given_poses(*poses, names_left_out(project), project.block, project.warnings);
-  if (control) add_control(*control, names_left_out(project), project.block, project.warnings);
+  if (control) {
+    add_control(*control, names_left_out(project), project.block, project.warnings);
+    if (images) warn_of_local_control(top, *control, project);
+  }
   if (const auto lines = top.existing_file("lines"))
     read_lines(*lines, names_left_out(project), project.block, project.warnings);
   for (const FrameMeasurementType& type : frame_measurement_types())

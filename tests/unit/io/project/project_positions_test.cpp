@@ -223,6 +223,19 @@ TEST_F(ProjectPositions, InTheBlocksOwnFrame) {
   EXPECT_FALSE(project.block.frames[FrameIndex(2)].position_prior);
 }
 
+TEST_F(ProjectPositions, DoNotTellTheOriginOfLocalControl) {
+  const std::string head = "name,role,x,y,z,sigma_horizontal_m,sigma_vertical_m,image,column_px,row_px,sigma_px\n";
+  const std::string geo = "EPSG:4326\n100_0001_0001.JPG -91.99 46.84 250\n";
+  const auto warned = Contains(HasSubstr("the coordinates of the control are local, and the project names no origin"));
+  write_file(folder_.path("control.csv"),
+             "# crs: local\n" + head + "a,control,1,2,3,0.01,0.04,100_0001_0001.JPG,9,9,1\n");
+  EXPECT_THAT(read("geo.txt", geo, "control: control.csv\n").warnings, warned);
+  EXPECT_THAT(read("geo.txt", geo, "control: control.csv\norigin: [46.84, -91.99, 250]\n").warnings, Not(warned));
+  write_file(folder_.path("control.csv"),
+             "# crs: EPSG:4326\n" + head + "a,control,-91.99,46.84,3,0.01,0.04,100_0001_0001.JPG,9,9,1\n");
+  EXPECT_THAT(read("geo.txt", geo, "control: control.csv\n").warnings, Not(warned));
+}
+
 TEST_F(ProjectPositions, FarFromTheHeadersAreToldOf) {
   std::string geo = "EPSG:4326\n";
   for (int i = 1; i <= 4; ++i) geo += "100_0001_000" + std::to_string(i) + ".JPG -91.99 46.85 250\n";
