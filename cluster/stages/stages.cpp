@@ -127,6 +127,7 @@ constexpr Stage kStages[] = {
      .needs = "features, candidates, where a camera leaves its parameters to the block",
      .makes = "focal_lengths/<camera>.txt",
      .unit = "camera",
+     .algorithm = 2,
      .optional = true,
      .run = focal_lengths},
     {.name = kMatchingStage,

@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "geometry/estimation/ransac.h"
+#include "geometry/numbers/decompositions.h"
 #include "geometry/numbers/median.h"
 #include "geometry/two_view/fundamental.h"
+#include "geometry/two_view/homography.h"
 #include "geometry/two_view/pair_estimators.h"
 #include "geometry/two_view/relative_adjustment.h"
 
@@ -20,10 +22,13 @@ namespace megablock {
 namespace {
 
 constexpr double kGridStep = 0.05;       // of the grid, in log f
-constexpr std::size_t kMostPairs = 400;  // matches of a pair that are used, evenly spaced
+constexpr std::size_t kMostPairs = 200;  // matches of a pair that are used, evenly spaced
 constexpr double kFewestSigmaPx = 0.2;   // residuals of matches are never smaller
-constexpr double kVote = 16;             // variances at which a pair contradicts a focal length with its whole vote
-constexpr double kDissent = 0.05;        // share of the pairs that bounds the interval
+// Variances at which a pair contradicts a focal length with its whole vote: those of four sigmas, and a share of all,
+// as matches of two images have errors in common.
+constexpr double kVote = 16, kShared = 0.15;
+constexpr double kPlane = 0.4;     // share of the matches that makes a plane
+constexpr double kDissent = 0.05;  // share of the pairs that bounds the interval
 
 struct Sensor {
   double larger_side, half_diagonal;  // pixels
@@ -68,13 +73,26 @@ struct Inliers {
   PointPairs points;
   Eigen::Matrix3d fundamental;
   double sigma = 0;
+  std::optional<Eigen::Matrix3d> homography;  // of the plane with most of them, if there are enough
 };
+
+// Where a plane holds most matches, F is one of many, and tells no orientation.
+std::optional<Eigen::Matrix3d> find_plane(const Inliers& inliers, std::uint64_t seed) {
+  RansacOptions sampling;
+  sampling.threshold = 3 * inliers.sigma;
+  sampling.max_draws = 500;
+  sampling.seed = seed;
+  const auto found = ransac(HomographyEstimator(inliers.points), sampling);
+  const auto enough = static_cast<int>(kPlane * static_cast<double>(inliers.points.size()));
+  if (!found || found->consensus.count < enough) return std::nullopt;
+  return found->model;
+}
 
 std::optional<Inliers> inliers_of_fundamental(const PointPairs& points, double larger_side, std::uint64_t seed,
                                               const FocalLengthOptions& options) {
   const auto found = find_fundamental(points, larger_side, seed, options);
   if (!found) return std::nullopt;
-  Inliers inliers{{}, found->model};
+  Inliers inliers{{}, found->model, 0, {}};
   const auto count = static_cast<std::size_t>(found->consensus.count);
   const std::size_t used = std::min(count, kMostPairs);
   std::vector<double> squares;
@@ -89,6 +107,7 @@ std::optional<Inliers> inliers_of_fundamental(const PointPairs& points, double l
     ++inlier;
   }
   inliers.sigma = std::max(1.4826 * std::sqrt(median(std::move(squares))), kFewestSigmaPx / larger_side);
+  inliers.homography = find_plane(inliers, seed);
   return inliers;
 }
 
@@ -110,30 +129,54 @@ class PairCost {
     return starts.empty() ? Point{} : from(focal, *starts.begin());
   }
 
+  // With the two orientations by the plane as starts.
+  Point from_plane(double focal) const {
+    Point best;
+    if (!inliers_.homography) return best;
+    const Eigen::Vector3d k(focal, focal, 1);
+    Eigen::Matrix3d homography = k.cwiseInverse().asDiagonal() * *inliers_.homography * k.asDiagonal();
+    homography /= singular_values3(homography).values[1];
+    for (const PlanarOrientation& planar : orientations_of_homography(homography)) {
+      // Each plane comes with both signs of its normal and base, which have the same residuals.
+      if (!(planar.base_to_distance > 0) || planar.normal.z() < 0) continue;
+      const Point point = from(focal, planar.orientation);
+      if (point.cost < best.cost) best = point;
+    }
+    return best;
+  }
+
   Point from(double focal, const RelativeOrientation& start) const {
     const PointPairs points = scaled(inliers_.points, 1 / focal);
     RelativeAdjustment by;
     by.scale = scale_ / focal;
     by.tolerance = 1e-6;
-    Point point{0, adjust_orientation(start, points, by)};
-    const Eigen::Matrix3d essential = essential_from(point.orientation);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const double u2 = squared_sampson(essential, points.a[i], points.b[i]) / (by.scale * by.scale);
-      point.cost += std::isfinite(u2) ? u2 / (1 + u2) : 1;
-    }
-    return point;
+    const RelativeOrientation adjusted = adjust_orientation(start, points, by);
+    return {cost_of(adjusted, points, by.scale), adjusted};
   }
 
  private:
+  static double cost_of(const RelativeOrientation& orientation, const PointPairs& points, double scale) {
+    const Eigen::Matrix3d essential = essential_from(orientation);
+    double cost = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double u2 = squared_sampson(essential, points.a[i], points.b[i]) / (scale * scale);
+      cost += std::isfinite(u2) ? u2 / (1 + u2) : 1;
+    }
+    return cost;
+  }
+
   const Inliers& inliers_;
   double scale_;
 };
 
-// c at the points of the grid: the best of three starts, which are F and both neighbours.
+// c at the points of the grid: the best of four starts, which are F, the plane, and both neighbours.
 std::vector<double> costs_on_grid(const Inliers& inliers, const std::vector<double>& focals) {
   const PairCost cost(inliers);
   std::vector<PairCost::Point> points;
-  for (const double focal : focals) points.push_back(cost.from_fundamental(focal));
+  for (const double focal : focals) {
+    const PairCost::Point by_fundamental = cost.from_fundamental(focal), by_plane = cost.from_plane(focal);
+    points.push_back(by_plane.cost < by_fundamental.cost ? by_plane : by_fundamental);
+  }
   const auto improve = [&](std::size_t k, std::size_t neighbour) {
     if (!std::isfinite(points[neighbour].cost)) return;
     PairCost::Point other = cost.from(focals[k], points[neighbour].orientation);
@@ -159,7 +202,8 @@ std::vector<double> votes_of(const Inliers& inliers, const std::vector<double>& 
   // u is 1 / 9, as the costs are in squares of three sigmas. It is more where no essential matrix fits as well as F.
   const double redundancy = std::max(1.0, static_cast<double>(inliers.points.size()) - 6);
   const double variance = std::max(1.0 / 9, lowest / redundancy);
-  for (double& vote : votes) vote = std::min(1.0, (vote - lowest) / (kVote * variance));
+  const double whole = (kVote + kShared * static_cast<double>(inliers.points.size())) * variance;
+  for (double& vote : votes) vote = std::min(1.0, (vote - lowest) / whole);
   return votes;
 }
 

@@ -9,15 +9,18 @@
 //     c(f) = min over R, t of  sum_i rho(f r_i(x_a / f, x_b / f; R, t) / s),   rho(u) = u^2 / (1 + u^2),
 //
 // is the smallest robust cost of its matches for this focal length, on a logarithmic grid of f; r is the Sampson
-// residual (geometry/two_view/sampson.h), and s three sigmas of the residuals of F. Homographies and rotations need no
-// special treatment, since any orientation with a base explains them.
+// residual (geometry/two_view/sampson.h), and s three sigmas of the residuals of F. A plane contradicts no focal
+// length: for each f an orientation explains its homography. It must also be found, or the pair would vote by the local
+// minima of its cost; so the homography of most matches gives a start for each f, besides F and the neighbours on the
+// grid.
 //
 // Some pairs have c with a narrow minimum, others only refuse focal lengths that are too long, and some are deceived by
 // wrong matches or by errors that F takes up. So a pair contradicts f by at most one vote,
 //
-//     v(f) = min(1, (c(f) - min c) / (16 u)),   u: the cost of one variance,
+//     v(f) = min(1, (c(f) - min c) / ((16 + 0.15 n) u)),   u: the cost of one variance, n: matches,
 //
-// that is from four sigmas on, and the votes of all pairs are added. The focal length is where fewest pairs contradict,
+// that is from four sigmas on, and from a share of all variances on, because the matches of two images have errors in
+// common. The votes of all pairs are added. The focal length is where fewest pairs contradict,
 // and its interval is where at most 5 % of the pairs, and at least one, contradict more than there. A given focal
 // length is wrong where many more pairs contradict it.
 //

@@ -25,10 +25,12 @@ namespace megablock {
 namespace {
 
 constexpr std::size_t kMostMatched = 120;  // pairs that are matched at most
-constexpr int kSample = 16;                // pairs that are enough where none contradicts a focal length that is known
-constexpr std::size_t kFewestPairs = 20;   // pairs for which the first generations of a block are enough
-constexpr std::int64_t kImages = 200;      // of a camera, the first ones
-constexpr std::size_t kFeatures = 3000;    // of an image, the coarsest
+// Pairs that are enough where fewer than so many of them contradict a focal length that is known.
+constexpr int kSample = 16;
+constexpr double kAgreement = 0.5;
+constexpr std::size_t kFewestPairs = 20;  // pairs for which the first generations of a block are enough
+constexpr std::int64_t kImages = 200;     // of a camera, the first ones
+constexpr std::size_t kFeatures = 3000;   // of an image, the coarsest
 // A focal length that is known is wrong where so many pairs contradict it, of all and at least, and where the better
 // one differs by so much (in log f): errors of the lens move it by some per cent.
 constexpr double kShareAgainst = 0.15, kFewestAgainst = 4, kContradiction = 0.2;
@@ -162,7 +164,7 @@ std::optional<FocalLength> estimate(const Job& job, const Camera& camera, const 
   if (camera.focal_known) {
     options.max_pairs = kSample;
     auto found = ask();
-    if (!found || (found->asked == kSample && found->against(camera.intrinsics[kFocal]) < 1)) return found;
+    if (!found || (found->asked == kSample && found->against(camera.intrinsics[kFocal]) < kAgreement)) return found;
     options.max_pairs = FocalLengthOptions().max_pairs;
   }
   return ask();

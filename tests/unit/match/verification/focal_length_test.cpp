@@ -147,6 +147,18 @@ TEST(FocalLength, IsNotToldByFlatGroundFromAbove) {
   EXPECT_LT(found->against(scene.focal_px), 2);  // of 12 pairs, some of which noise deceives
 }
 
+// An orientation explains the images of a plane with any focal length, and has to be found. (Among many wrong matches F
+// takes up some that agree with it by chance, and a pair may then prefer any focal length.)
+TEST(FocalLength, APlaneContradictsNone) {
+  Scene scene;
+  scene.relief = 0;
+  scene.wrong = 0;
+  const auto found = found_in(scene, 1);
+  ASSERT_TRUE(found);
+  for (const double factor : {0.5, 0.7, 1.0, 1.4, 3.0})
+    EXPECT_LT(found->against(factor * scene.focal_px), 1.5) << factor;  // of 12 pairs
+}
+
 // A header that is wrong by a factor of ten is contradicted by nearly all pairs, the right one by none.
 TEST(FocalLength, ContradictsAWrongHeader) {
   const auto found = found_in({}, 1);
