@@ -34,15 +34,20 @@ struct Difference {
   double offset = 0, scatter = 0, sigma = 0;
 };
 
-Difference difference_of(const Comparison& c, double focal_share) {
+// The median, and its sigma where each difference has at least `least_sigma`.
+Difference median_difference(const std::vector<double>& differences, double least_sigma) {
   Difference found;
-  found.offset = median(c.differences);
+  found.offset = median(differences);
   std::vector<double> rest;
-  for (const double d : c.differences) rest.push_back(std::abs(d - found.offset));
+  for (const double d : differences) rest.push_back(std::abs(d - found.offset));
   found.scatter = kNormal * median(std::move(rest));
-  const double of_points = kOfMedian * std::max(found.scatter, median(c.control_sigmas)) /
-                           std::sqrt(static_cast<double>(c.differences.size()));
-  found.sigma = std::hypot(of_points, median(c.views) * focal_share);
+  found.sigma = kOfMedian * std::max(found.scatter, least_sigma) / std::sqrt(static_cast<double>(differences.size()));
+  return found;
+}
+
+Difference difference_of(const Comparison& c, double focal_share) {
+  Difference found = median_difference(c.differences, median(c.control_sigmas));
+  found.sigma = std::hypot(found.sigma, median(c.views) * focal_share);
   return found;
 }
 
@@ -141,22 +146,19 @@ void remove_offset(const PositionOffset& offset, const std::vector<FrameIndex>& 
 PositionOffset adjusted_offset(const MovedPositions& moved, const Block& block, const BlockState& adjusted,
                                const IndexedVector<FrameIndex, Eigen::Vector3d>& variances) {
   PositionOffset found = moved.offset;
-  std::array<Comparison, 3> compared;
-  std::array<std::vector<double>, 3> own;
+  std::array<std::vector<double>, 3> differences, own;  // given minus adjusted; variances
   for (const FrameIndex frame : moved.frames) {
     if (!has_position(block, adjusted, frame)) continue;
     const Eigen::Vector3d d = difference(adjusted.frames[frame], *block.frames[frame].position_prior);
     for (std::size_t k = 0; k < 3; ++k) {
-      compared[k].differences.push_back(-d[static_cast<int>(k)]);
+      differences[k].push_back(-d[static_cast<int>(k)]);
       own[k].push_back(variances[frame][static_cast<int>(k)]);
     }
   }
   for (int k = 0; k < 3; ++k) {
     const auto axis = static_cast<std::size_t>(k);
-    Comparison& c = compared[axis];
-    if (found.offset[k] == 0 || c.differences.empty()) continue;
-    c.control_sigmas = c.views = {0};
-    const Difference d = difference_of(c, 0);
+    if (found.offset[k] == 0 || differences[axis].empty()) continue;
+    const Difference d = median_difference(differences[axis], 0);
     found.offset[k] += d.offset;
     found.sigma[k] = std::sqrt(d.sigma * d.sigma + median(own[axis]));
   }

@@ -20,9 +20,9 @@
 //     v(f) = min(1, (c(f) - min c) / ((16 + 0.15 n) u)),   u: the cost of one variance, n: matches,
 //
 // that is from four sigmas on, and from a share of all variances on, because the matches of two images have errors in
-// common. The votes of all pairs are added. The focal length is where fewest pairs contradict,
-// and its interval is where at most 5 % of the pairs, and at least one, contradict more than there. A given focal
-// length is wrong where many more pairs contradict it.
+// common. The votes of all pairs are added. The focal length is where fewest pairs contradict, and its interval is
+// where at most 5 % of the pairs, and at least one, contradict more than there. A given focal length is wrong where
+// many more pairs contradict it.
 //
 // Lens distortion would pass for another focal length: 8 % in the corners move it by 18 %. So it is found first, from F
 // alone, for all pairs of the camera together. The correction of an image point x at the radius r from the principal

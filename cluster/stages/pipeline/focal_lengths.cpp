@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <set>
 #include <span>
@@ -157,8 +158,14 @@ std::optional<FocalLength> estimate(const Job& job, const Camera& camera, const 
   FocalLengthOptions options;
   options.max_residual_px = job.settings.matching.max_residual_px;
   options.threads = job.options.threads;
+  std::vector<MatchedImages> matched;  // the first pairs, which are asked again where the sample does not agree
   const auto batch = [&](std::size_t first, std::size_t end) {
-    return match_coarsest(job, camera, std::span(pairs).subspan(first, end - first));
+    if (end > matched.size()) {
+      const auto next = std::span(pairs).subspan(matched.size(), end - matched.size());
+      std::ranges::move(match_coarsest(job, camera, next), std::back_inserter(matched));
+    }
+    return std::vector(matched.begin() + static_cast<std::ptrdiff_t>(first),
+                       matched.begin() + static_cast<std::ptrdiff_t>(end));
   };
   const auto ask = [&] { return focal_length_of(pairs.size(), batch, camera.width, camera.height, options); };
   if (camera.focal_known) {
