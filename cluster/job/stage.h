@@ -22,8 +22,9 @@ struct JobRecord;     // cluster/job/job_record.h
 struct StageResults;  // cluster/stages/stages.h
 
 // The names of stages of which others speak: in messages, events and records.
-inline constexpr const char *kFeatureStage = "features", *kMatchingStage = "matching", *kTrackStage = "tracks",
-                            *kCoverageStage = "coverage", *kOrientationStage = "orientation", *kMergeStage = "merge";
+inline constexpr const char *kFeatureStage = "features", *kFocalLengthStage = "focal_lengths",
+                            *kMatchingStage = "matching", *kTrackStage = "tracks", *kCoverageStage = "coverage",
+                            *kOrientationStage = "orientation", *kMergeStage = "merge";
 
 struct Stage {
   const char* name = "";        // in records, events, progress and `status`

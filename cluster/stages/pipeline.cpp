@@ -185,21 +185,40 @@ void remove_surplus(const Job& job, const JobRecord& record, const std::vector<s
       if (!wanted.contains(name)) job.store.remove(name);
 }
 
-// As far as the command `last` says; empty: all of them. Returns whether the last of all has run.
+// The block as it was written, for a run from images with the names of the images.
+JobBlock open_block(const JobStore& store, const std::string& tie_points) {
+  JobBlock own{read_block_without_names(store.verified_path("block.h5")), PagedTables(store.directory())};
+  page_tables(own.block, own.tables);
+  if (tie_points.empty()) restore_names(store, own);
+  return own;
+}
+
+// As far as the command `last` says; empty: all of them, unless the run begins again. Returns whether the last of all
+// has run.
 bool run_stages(const Job& job, JobRecord& record, const std::string& last, StageResults& results) {
   const bool given_tie_points = !results.tie_points.empty();
   for (const Stage& stage : all_stages()) {
     if (!stage.runs(given_tie_points)) continue;
     stage.run(stage, job, record, results);
+    if (results.begins_again) return false;
     if (stage.ends(last, given_tie_points)) return &stage == &all_stages().back();
   }
   return true;
 }
 
+// Stages change the block of the job. A run that begins again needs it as it was.
 void run_all(const Job& job, JobRecord& record, JobBlock& own, const std::string& tie_points) {
-  StageResults results(own);
-  results.tie_points = tie_points;
-  if (run_stages(job, record, job.options.last_stage, results)) remove_surplus(job, record, results.tracks);
+  const std::size_t notes = record.notes.size(), failures = record.failures.size();
+  while (true) {
+    StageResults results(own);
+    results.tie_points = tie_points;
+    if (run_stages(job, record, job.options.last_stage, results)) remove_surplus(job, record, results.tracks);
+    if (!results.begins_again) return;
+    own = open_block(job.store, tie_points);
+    record.stages.clear();
+    record.notes.resize(notes);
+    record.failures.resize(failures);
+  }
 }
 
 // The tracks of all tiles, in the order of their indices.
@@ -315,9 +334,7 @@ int with_job(const RunOptions& run_options, Communicator& ranks, const Stages& s
     keep_freed_memory();  // features of images come next
   else
     use_memory_sparingly();  // gives back the heap that the preparation has freed, too
-  JobBlock own{read_block_without_names(store.verified_path("block.h5")), PagedTables(store.directory())};
-  page_tables(own.block, own.tables);
-  if (tie_points.empty()) restore_names(store, own);
+  JobBlock own = open_block(store, tie_points);
   JobOptions settings = read_options(written.settings());
   settings.adjustment.observations.half = run_options.half;
   const Job job{.options = completed(run_options, ranks),

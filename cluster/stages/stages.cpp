@@ -1,10 +1,13 @@
 #include "cluster/stages/stages.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <span>
 
 #include "cluster/job/job.h"
 #include "cluster/job/job_options.h"
+#include "cluster/job/messages.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/process/process_memory.h"
 #include "cluster/stages/common/block_tables.h"
@@ -88,9 +91,19 @@ void orientation(const Stage& stage, const Job& job, JobRecord& record, StageRes
     throw AgreedError<ComputeError>(why_nothing_is_oriented(job.block));
 }
 
+// The halves of a split test begin with the focal length of their job.
 void cameras(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
-  run_cameras(stage, job, record, results.tiles, results.oriented.state, results.own.block);
+  const auto better = run_cameras(stage, job, record, results.tiles, results.oriented.state, results.own.block);
   return_freed_memory();
+  if (job.options.half.half != Half::kNone) return;
+  for (const BetterFocalLength& found : better) {
+    if (!keep_focal_length(*find_stage(kFocalLengthStage), job, found.camera, found.focal_px, found.sigma_px)) continue;
+    results.begins_again = true;
+    say(job, stage.name,
+        fmt::format("camera '{}': the oriented block gives a focal length of {:.0f} px; the run begins again with it, "
+                    "since pairs may have been lost or turned by the wrong one",
+                    job.block.cameras[found.camera].name, found.focal_px));
+  }
 }
 
 void adjustment(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
@@ -123,11 +136,11 @@ constexpr Stage kStages[] = {
      .kind = "candidates",
      .read_file = [](const std::string& path) { read_candidates(path); },
      .run = candidates},
-    {.name = "focal_lengths",
+    {.name = kFocalLengthStage,
      .needs = "features, candidates, where a camera leaves its parameters to the block",
      .makes = "focal_lengths/<camera>.txt",
      .unit = "camera",
-     .algorithm = 2,
+     .algorithm = 3,
      .optional = true,
      .run = focal_lengths},
     {.name = kMatchingStage,
@@ -193,7 +206,7 @@ constexpr Stage kStages[] = {
      .needs = "tracks, orientation, where a camera chooses its parameters",
      .makes = "cameras/<rig>.txt",
      .unit = "rig",
-     .algorithm = 3,
+     .algorithm = 4,
      .command_given = "",
      .optional = true,
      .run = cameras},

@@ -26,6 +26,7 @@ struct StageResults {
   Tiles tiles;                        // tiles
   std::vector<std::string> tracks;    // tracks: units by tile
   OrientationStage oriented;          // orientation
+  bool begins_again = false;          // cameras: the matching needs a better focal length, which focal_lengths has kept
   std::vector<std::string> adjusted;  // adjustment: units by tile; empty for tiles that could not be adjusted
 };
 

@@ -43,8 +43,11 @@ class Determination {
         continue;
       }
       const auto row = static_cast<std::size_t>(found - row_camera_.begin());
-      result.push_back(chosen[row]);
-      result.back().focal_contradicted = contradicts_focal(block_.cameras[camera], whole_.state.cameras[row]);
+      CameraChoice choice = chosen[row];
+      choice.focal_contradicted = contradicts_focal(block_.cameras[camera], whole_.state.cameras[row]);
+      choice.focal_px = whole_.state.cameras[row][kFocal];
+      choice.focal_sigma_px = focal_sigma(rows_[row]);
+      result.push_back(std::move(choice));
     }
     return result;
   }
@@ -56,6 +59,12 @@ class Determination {
     constexpr double kSigmas = 3;
     const double sigma = default_intrinsic_sigmas(camera)[kFocal];
     return camera.focal_known && sigma > 0 && std::abs(found[kFocal] - camera.intrinsics[kFocal]) > kSigmas * sigma;
+  }
+
+  // With all parameters of the last choice estimated; 0: it is held.
+  double focal_sigma(const ChoiceCamera& row) const {
+    const auto f = std::find(row.parameters.begin(), row.parameters.end(), kFocal);
+    return f == row.parameters.end() ? 0 : sigmas_[row.first + (f - row.parameters.begin())];
   }
 
   void adjust_rolling(const BlockState& state, const IndexedVector<CameraIndex, double>& readout_s) {
@@ -99,7 +108,21 @@ class Determination {
     if (std::find(free.begin(), free.end(), 0) != free.end()) adjust_with_held(free);
     const auto all = condense_on_cameras(whole_.problem, whole_.state);
     if (!all) throw ComputeError("a camera has no observation that the adjustment keeps");
+    sigmas_ = sigmas_of(*all, free);
     return {*all, forms_without_groups(all->minimum.size()), std::ssize(whole_.problem.frames)};
+  }
+
+  // [rows] of the free parameters with the others held; 0 for these.
+  static Eigen::VectorXd sigmas_of(const CameraForm& form, const std::vector<std::uint8_t>& free) {
+    std::vector<Eigen::Index> rows;
+    for (std::size_t i = 0; i < free.size(); ++i)
+      if (free[i]) rows.push_back(static_cast<Eigen::Index>(i));
+    const Eigen::MatrixXd covariance = Eigen::MatrixXd(form.information(rows, rows))
+                                           .ldlt()
+                                           .solve(Eigen::MatrixXd::Identity(std::ssize(rows), std::ssize(rows)));
+    Eigen::VectorXd sigmas = Eigen::VectorXd::Zero(form.minimum.size());
+    sigmas(rows) = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+    return sigmas;
   }
 
   void adjust_with_held(const std::vector<std::uint8_t>& free) {
@@ -169,6 +192,7 @@ class Determination {
   std::vector<ChoiceCamera> rows_;
   std::vector<CameraIndex> row_camera_;  // [rows_]
   Eigen::VectorXd start_, prior_sigma_;
+  Eigen::VectorXd sigmas_;  // of the last forms
 };
 
 }  // namespace

@@ -65,6 +65,8 @@ struct CameraChoice {
   std::string reason;  // "estimated: f; cx, cy; k1 (3.1 %); held: k2 (0.02 %); ..."
   // The images contradict the known focal length by more than three sigmas of its prior, which must not pull any more.
   bool focal_contradicted = false;
+  // Of the adjusted sample, pixels. The sigma is a formal one. 0: no image of the camera in the sample.
+  double focal_px = 0, focal_sigma_px = 0;
 };
 
 // The forms of all images and of those without each group, over all rows. Poses and points are at the optimum of the

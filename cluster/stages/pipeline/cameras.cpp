@@ -2,7 +2,7 @@
 
 // A unit is a rig whose cameras ask for a choice of their parameters or for their readout time. Its file has a line for
 // each of them: the number of the camera in the block, the chosen parameters as a mask, 1 where the focal length is
-// contradicted, the readout time in microseconds, and the reason.
+// contradicted, a better one and its sigma in pixels, the readout time in microseconds, and the reason.
 
 #include <fmt/core.h>
 
@@ -81,6 +81,15 @@ std::vector<FrameIndex> frames_of_sample(const Job& job, const Tiles& tiles, con
     if (std::ssize(frames) >= kEnough) break;
   }
   return frames;
+}
+
+// Of images of the wrong focal length pairs are lost, and others are verified with a wrong orientation. A tenth does
+// little harm.
+bool is_wrong(const Camera& camera, const CameraChoice& choice) {
+  constexpr double kHarmless = 0.1, kMostSigma = 0.05;
+  const bool may_change = choice.focal_contradicted || !camera.focal_known;
+  return may_change && contains(choice.estimated, kFocal) && choice.focal_sigma_px <= kMostSigma * choice.focal_px &&
+         std::abs(std::log(choice.focal_px / camera.intrinsics[kFocal])) > kHarmless;
 }
 
 // What a unit finds for one of its cameras.
@@ -177,8 +186,9 @@ std::vector<Found> find(const Job& job, const Tiles& tiles, const BlockState& st
 void write_found(const std::string& path, const std::vector<CameraIndex>& cameras, const std::vector<Found>& found) {
   std::ofstream out(path);
   for (std::size_t c = 0; c < cameras.size(); ++c)
-    out << cameras[c].value << ' ' << found[c].choice.estimated << ' ' << found[c].choice.focal_contradicted << ' '
-        << found[c].readout_us << ' ' << found[c].choice.reason << '\n';
+    out << fmt::format("{} {} {:d} {} {} {} {}\n", cameras[c].value, found[c].choice.estimated,
+                       found[c].choice.focal_contradicted, found[c].choice.focal_px, found[c].choice.focal_sigma_px,
+                       found[c].readout_us, found[c].choice.reason);
 }
 
 void take_choice(CameraChoice choice, Camera& camera, Intrinsics& values) {
@@ -194,15 +204,19 @@ void take_choice(CameraChoice choice, Camera& camera, Intrinsics& values) {
       values[static_cast<std::size_t>(p)] = camera.intrinsics[static_cast<std::size_t>(p)];
 }
 
-void take_found(const std::string& path, Block& block, BlockState& state) {
+void take_found(const std::string& path, Block& block, BlockState& state, std::vector<BetterFocalLength>& better) {
   std::ifstream in(path);
   std::int64_t number = 0;
   Found found;
-  while (in >> number >> found.choice.estimated >> found.choice.focal_contradicted >> found.readout_us &&
-         std::getline(in >> std::ws, found.choice.reason)) {
-    Camera& camera = block.cameras[CameraIndex(number)];
+  CameraChoice& choice = found.choice;
+  while (in >> number >> choice.estimated >> choice.focal_contradicted >> choice.focal_px >> choice.focal_sigma_px >>
+             found.readout_us &&
+         std::getline(in >> std::ws, choice.reason)) {
+    const CameraIndex c(number);
+    Camera& camera = block.cameras[c];
+    if (camera.choose && is_wrong(camera, choice)) better.push_back({c, choice.focal_px, choice.focal_sigma_px});
     if (camera.choose)
-      take_choice(found.choice, camera, state.cameras[CameraIndex(number)]);
+      take_choice(choice, camera, state.cameras[c]);
     else
       camera.choice = found.choice.reason;
     if (camera.estimate_readout) camera.readout_s = 1e-6 * static_cast<double>(found.readout_us);
@@ -211,8 +225,8 @@ void take_found(const std::string& path, Block& block, BlockState& state) {
 
 }  // namespace
 
-void run_cameras(const Stage& stage, const Job& job, JobRecord& record, const Tiles& tiles, BlockState& state,
-                 Block& block) {
+std::vector<BetterFocalLength> run_cameras(const Stage& stage, const Job& job, JobRecord& record, const Tiles& tiles,
+                                           BlockState& state, Block& block) {
   std::vector<Unit> units;
   const std::uint64_t inputs = inputs_hash(stage, job, state);
   for (RigIndex rig(0); job.block.rigs.contains(rig); ++rig.value) {
@@ -228,15 +242,17 @@ void run_cameras(const Stage& stage, const Job& job, JobRecord& record, const Ti
   }
   if (units.empty()) {
     if (job.is_first_rank()) remove_record(job.store, stage.name);  // an earlier run may have needed the stage
-    return;
+    return {};
   }
   const StageOutcome outcome = run_stage(job, record, stage, units);
   if (!outcome.failures.empty())
     throw AgreedError<ComputeError>("the parameters of the cameras could not be chosen: " +
                                     outcome.failures.front().reason);
-  for (const Unit& unit : units) take_found(job.store.verified_path(unit.name), block, state);
+  std::vector<BetterFocalLength> better;
+  for (const Unit& unit : units) take_found(job.store.verified_path(unit.name), block, state, better);
   for (const Camera& camera : block.cameras)
     if (asks_its_images(camera)) say(job, stage.name, fmt::format("camera '{}': {}", camera.name, camera.choice));
+  return better;
 }
 
 }  // namespace megablock

@@ -2,7 +2,6 @@
 // estimated, chosen from a sample of the oriented block (merge/camera/determined_parameters.h).
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "cluster/job/job.h"
@@ -12,9 +11,16 @@
 
 namespace megablock {
 
+// The focal length of a camera that the oriented block found, where it was matched with a wrong one.
+struct BetterFocalLength {
+  CameraIndex camera;
+  double focal_px = 0, sigma_px = 0;
+};
+
 // Collective. Sets the prior sigmas of the cameras of `block` (that of the job) by the choice, and puts held parameters
-// of the state back to their start values. Does nothing where no camera asks for it.
-void run_cameras(const Stage& stage, const Job& job, JobRecord& record, const Tiles& tiles, BlockState& state,
-                 Block& block);
+// of the state back to their start values. Does nothing where no camera asks for it. Returns the focal lengths
+// that differ from those of the matching by more than a tenth.
+std::vector<BetterFocalLength> run_cameras(const Stage& stage, const Job& job, JobRecord& record, const Tiles& tiles,
+                                           BlockState& state, Block& block);
 
 }  // namespace megablock

@@ -14,6 +14,7 @@
 
 #include "cluster/job/messages.h"
 #include "cluster/job/work_queue.h"
+#include "cluster/mpi/collective.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
 #include "io/block/tracks.h"
@@ -183,6 +184,8 @@ struct Finding {
   double sigma = 0;     // relative; 0: the pairs only limit the focal length
   double against = 0;   // number of pairs that contradict the focal length of the camera
   int asked = 0;
+  // Of the block that was oriented with the focal length above, pixels and relative; 0: it agrees.
+  double block_focal_px = 0, block_sigma = 0;
 };
 
 // A point of the interval near the usual focal length, but away from the ends, where pairs begin to contradict.
@@ -213,14 +216,16 @@ Finding judge(const FocalLength& found, const Camera& camera) {
 
 void write_finding(const std::string& path, const Finding& finding) {
   std::ofstream out(path);
-  out << fmt::format("{} {} {} {}\n", finding.focal_px, finding.sigma, finding.against, finding.asked);
+  out << fmt::format("{} {} {} {} {} {}\n", finding.focal_px, finding.sigma, finding.against, finding.asked,
+                     finding.block_focal_px, finding.block_sigma);
   if (!out.flush()) throw InputError(path + ": cannot be written; check the disk");
 }
 
 Finding read_finding(const std::string& path) {
   std::ifstream in(path);
   Finding finding;
-  if (!(in >> finding.focal_px >> finding.sigma >> finding.against >> finding.asked))
+  if (!(in >> finding.focal_px >> finding.sigma >> finding.against >> finding.asked >> finding.block_focal_px >>
+        finding.block_sigma))
     throw StoreError(path + ": is not an estimate of a focal length; delete it and run the job again");
   return finding;
 }
@@ -230,30 +235,48 @@ std::string text_of(const Camera& camera, double focal_px) {
                      36 * focal_px / std::max(camera.width, camera.height));
 }
 
+// "640 px (29 mm of the 35 mm format) +- 1.2 % by 40 pairs of images".
+std::string source_of(const Finding& finding, const Camera& camera) {
+  if (finding.block_focal_px > 0)
+    return fmt::format("{} +- {:.2g} % by a first orientation of the block", text_of(camera, finding.block_focal_px),
+                       100 * finding.block_sigma);
+  if (finding.sigma > 0)
+    return fmt::format("{} +- {:.1f} % by {} pairs of images", text_of(camera, finding.focal_px), 100 * finding.sigma,
+                       finding.asked);
+  return fmt::format("about {}, which few pairs of images contradict", text_of(camera, finding.focal_px));
+}
+
+std::string note_of(const Finding& finding, const Camera& camera) {
+  const std::string found = source_of(finding, camera);
+  if (!camera.focal_known)
+    return fmt::format("camera '{}': the headers tell no focal length; the block starts with {}", camera.name, found);
+  const std::string against = finding.block_focal_px > 0 ? "the block that was oriented with it contradicts it"
+                                                         : fmt::format("{:.0f} of {} pairs of images contradict it",
+                                                                       finding.against, finding.asked);
+  return fmt::format(
+      "camera '{}': the focal length of {} cannot be right: {}; the block starts with {}; check the header, and a lens "
+      "or a crop of which it does not know; 'calibrate: true' keeps it",
+      camera.name, text_of(camera, camera.intrinsics[kFocal]), against, found);
+}
+
 // Takes what was found. Returns what to note; empty: nothing.
 std::string take(const Finding& finding, Camera& camera) {
-  if (!(finding.focal_px > 0)) return "";
-  const double before = camera.intrinsics[kFocal];
-  const std::string found =
-      finding.sigma > 0
-          ? fmt::format("{} +- {:.1f} % by {} pairs of images", text_of(camera, finding.focal_px), 100 * finding.sigma,
-                        finding.asked)
-          : fmt::format("about {}, which few pairs of images contradict", text_of(camera, finding.focal_px));
-  const std::string note =
-      camera.focal_known
-          ? fmt::format(
-                "camera '{}': the focal length of {} cannot be right: {:.0f} of {} pairs of images contradict "
-                "it; the block starts with {}; check the header, and a lens or a crop of which it does not "
-                "know; 'calibrate: true' keeps it",
-                camera.name, text_of(camera, before), finding.against, finding.asked, found)
-          : fmt::format("camera '{}': the headers tell no focal length; the block starts with {}", camera.name, found);
-  camera.intrinsics[kFocal] = finding.focal_px;
-  camera.focal_known = finding.sigma > 0 && finding.sigma <= kKnown;
+  const bool by_block = finding.block_focal_px > 0;
+  const double focal = by_block ? finding.block_focal_px : finding.focal_px;
+  const double sigma = by_block ? finding.block_sigma : finding.sigma;
+  if (!(focal > 0)) return "";
+  std::string note = note_of(finding, camera);
+  camera.intrinsics[kFocal] = focal;
+  camera.focal_known = sigma > 0 && sigma <= kKnown;
   ParameterMask estimated = 0;
   for (int p = 0; p < camera.intrinsics.size(); ++p)
     if (camera.prior_sigma[static_cast<std::size_t>(p)] > 0) estimated |= mask_of(p);
   camera.prior_sigma = default_intrinsic_sigmas(camera, estimated);
   return note;
+}
+
+std::string unit_of(const Stage& stage, CameraIndex camera) {
+  return fmt::format("{}/{:06}.txt", stage.folder(), camera.value);
 }
 
 }  // namespace
@@ -277,7 +300,7 @@ void run_focal_lengths(const Stage& stage, const Job& job, JobRecord& record, co
       for (const ImageIndex image : {pair.a, pair.b})
         hasher.add(image.value).add(features.image_fingerprint[static_cast<std::size_t>(image.value)]);
     Unit unit;
-    unit.name = fmt::format("{}/{:06}.txt", stage.folder(), c.value);
+    unit.name = unit_of(stage, c);
     unit.fingerprint = hasher.value();
     unit.write = [&job, &camera, &pairs](const std::string& path) {
       const auto found = estimate(job, camera, pairs);
@@ -296,6 +319,21 @@ void run_focal_lengths(const Stage& stage, const Job& job, JobRecord& record, co
     const std::string note = take(read_finding(job.store.verified_path(units[i].name)), block.cameras[cameras[i]]);
     if (!note.empty()) add_note(job, record, stage.name, note);
   }
+}
+
+bool keep_focal_length(const Stage& stage, const Job& job, CameraIndex camera, double focal_px, double sigma_px) {
+  const std::string unit = unit_of(stage, camera);
+  const std::string kept = on_first_rank(job.ranks, [&]() -> std::string {
+    const std::optional<UnitSeal> seal = job.store.seal(unit);
+    if (!seal || !asks(job.block.cameras[camera])) return "";
+    Finding finding = read_finding(job.store.verified_path(unit));
+    if (finding.block_focal_px > 0) return "";
+    finding.block_focal_px = focal_px;
+    finding.block_sigma = sigma_px / focal_px;
+    job.store.write(unit, seal->fingerprint, [&](const std::string& path) { write_finding(path, finding); });
+    return "kept";
+  });
+  return !kept.empty();
 }
 
 }  // namespace megablock

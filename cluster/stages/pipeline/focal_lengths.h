@@ -1,5 +1,9 @@
 // Runs the stage of focal lengths. It makes focal_lengths/<camera>.txt: the focal length of a camera with
 // `calibrate: auto`, estimated from the matches of some pairs of its images (match/verification/focal_length.h).
+//
+// Pairs of planes agree with every focal length, but a block of them does not. So a wrong focal length may pass this
+// stage and be found when the block is oriented. Pairs were then lost or turned by it. The file of the camera keeps the
+// better focal length, and the run begins again with it.
 #pragma once
 
 #include "cluster/job/job.h"
@@ -14,5 +18,10 @@ namespace megablock {
 // or where the images contradict it clearly, and notes it. Does nothing where no camera asks for it.
 void run_focal_lengths(const Stage& stage, const Job& job, JobRecord& record, const FeatureStage& features,
                        const CandidateGraph& graph, Block& block);
+
+// Collective. Keeps the focal length that the oriented block gives a camera, for this run's second beginning and all
+// later runs. Returns false, and keeps nothing, where the stage did not ask for the camera or has kept one before: a
+// run begins again once at most for each camera.
+bool keep_focal_length(const Stage& stage, const Job& job, CameraIndex camera, double focal_px, double sigma_px);
 
 }  // namespace megablock

@@ -72,6 +72,28 @@ TEST(DeterminedParameters, SayWhereAKnownFocalLengthIsContradicted) {
   }
 }
 
+TEST(DeterminedParameters, GiveTheFocalLengthWithItsSigma) {
+  double squares = 0;
+  constexpr int kSeeds = 20;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    SimulationOptions options = aerial(12);
+    options.seed = static_cast<std::uint64_t>(seed);
+    options.image_noise_px = AdjustOptions().observations.image_sigma_px;
+    SimulatedBlock simulated = simulate_block(options);
+    const double truth = simulated.truth.cameras[CameraIndex(0)][kFocal];
+    Camera& camera = simulated.block.cameras[CameraIndex(0)];
+    camera.intrinsics[kFocal] = 0.8 * truth;
+    camera.focal_known = false;
+    const CameraChoice choice = choice_of(simulated);
+    ASSERT_GT(choice.focal_sigma_px, 0) << seed;
+    EXPECT_NEAR(choice.focal_px, truth, 0.02 * truth) << seed;
+    squares += std::pow((choice.focal_px - truth) / choice.focal_sigma_px, 2);
+  }
+  // Screening, the choice of parameters and the prior move the ratio a little.
+  EXPECT_GT(squares / kSeeds, 0.3);
+  EXPECT_LT(squares / kSeeds, 2.5);
+}
+
 // Each image has an error of its own that looks like an affinity and a decentring. The normal equations see many
 // sigmas.
 TEST(DeterminedParameters, AreNotThoseOfErrorsOfSingleImages) {
