@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "cluster/outcome/diagnostics.h"
 #include "io/evaluation/evaluate.h"
 #include "io/evaluation/feature_statistics.h"
 #include "io/evaluation/remarks.h"
@@ -131,7 +133,10 @@ std::string result_figures(const JobStore& store) {
   if (std::string written = written_figures(store); !written.empty()) return written;
   const BlockResult result = read_result_without_tracks(path);
   const StoredTracks tracks(path);
-  return to_json({reprojection_statistics(result, tracks), remarks(result, tracks)}, result);
+  ResultFigures figures{reprojection_statistics(result, tracks), remarks(result, tracks)};
+  const BlockDiagnostics diagnostics = diagnose_result(result, tracks, options_of_job(store).diagnostics);
+  std::ranges::move(loose_part_remarks(diagnostics, result.block), std::back_inserter(figures.remarks));
+  return to_json(figures, result);
 }
 
 std::vector<std::string> result_remarks(const JobStore& store) {

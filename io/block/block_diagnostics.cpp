@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -52,6 +53,9 @@ class JsonWriter {
       row["frames_beyond"] = link.frames;
       return row;
     });
+    json["loose_parts"] = list(d_.loose_parts, [&](const auto& part) {
+      return OrderedJson{{"frames", names(part.frames)}, {"joints", names(part.joints)}, {"points", part.points}};
+    });
     json["proposals"] = list(d_.proposals, [&](const auto& proposal) { return of(proposal); });
     json["footprints"] = OrderedJson::array();
     if (d_.footprints.size() <= kMostListedFootprints)
@@ -67,6 +71,9 @@ class JsonWriter {
     return array;
   }
   const std::string& name(FrameIndex frame) const { return block_.frames[frame].name; }
+  OrderedJson names(const std::vector<FrameIndex>& frames) const {
+    return list(frames, [&](FrameIndex f) { return name(f); });
+  }
   OrderedJson between(FrameIndex a, FrameIndex b) const { return OrderedJson::array({name(a), name(b)}); }
 
   OrderedJson requested() const {
@@ -172,6 +179,7 @@ std::string to_text(const BlockDiagnostics& d, const Block& block) {
     text += fmt::format("{} to the rest of the block only by the link between {}\n",
                         counted(link.frames, "frame") + (link.frames == 1 ? " is connected" : " are connected"),
                         between(link.a, link.b));
+  for (const auto& part : d.loose_parts) text += loose_part_text(part, d, block) + "\n";
   if (!d.proposals.empty())
     text += fmt::format("{} proposed\n", d.proposals.size() == 1 ? "1 exposure is"
                                                                  : fmt::format("{} exposures are", d.proposals.size()));
@@ -182,6 +190,44 @@ std::string to_text(const BlockDiagnostics& d, const Block& block) {
         "overlaps\n";
   if (!d.links_known) text += "not examined, because there are no matches or tie points yet: links\n";
   return text;
+}
+
+std::string loose_part_text(const BlockDiagnostics::LoosePart& part, const BlockDiagnostics& d, const Block& block) {
+  const auto names = [&](const std::vector<FrameIndex>& frames) {
+    constexpr std::size_t kNamed = 3;
+    std::string text;
+    for (std::size_t i = 0; i < std::min(kNamed, frames.size()); ++i)
+      text += (i == 0 ? "'" : i + 1 == frames.size() ? " and '" : ", '") + block.frames[frames[i]].name + "'";
+    return text + (frames.size() > kNamed ? fmt::format(" and {} more", frames.size() - kNamed) : "");
+  };
+  const std::string who = fmt::format("{} ({})", counted(std::ssize(part.frames), "frame"), names(part.frames));
+  const bool one = part.frames.size() == 1;
+  const std::string how =
+      part.joints.empty()
+          ? fmt::format("{} no link of {} tie points with the rest of the block; the best has {}", one ? "has" : "have",
+                        d.requested.min_link_points, part.points)
+          : fmt::format("{} only {} with the rest of the block; the best link past {} has {} of {} tie points",
+                        one ? "shares" : "share", names(part.joints), part.joints.size() == 1 ? "it" : "them",
+                        part.points, d.requested.min_link_points);
+  return who + " " + how;
+}
+
+std::vector<std::string> loose_part_remarks(const BlockDiagnostics& d, const Block& block) {
+  constexpr std::size_t kMost = 10;
+  std::vector<std::string> remarks;
+  std::size_t others = 0;
+  for (const auto& part : d.loose_parts) {
+    if (part.frames.size() < 2) continue;
+    if (remarks.size() == kMost)
+      ++others;
+    else
+      remarks.push_back(loose_part_text(part, d, block) +
+                        ": nothing else tells the size of this part, which may be wrong, and with it its place; add "
+                        "images that see both sides, positions or control points");
+  }
+  if (others > 0)
+    remarks.push_back(fmt::format("{} more parts have no size of their own; 'diagnose' lists them", others));
+  return remarks;
 }
 
 }  // namespace megablock

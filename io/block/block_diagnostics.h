@@ -86,6 +86,14 @@ struct BlockDiagnostics {
   std::vector<Link> weak_links;    // all links between two parts
   std::vector<Link> single_links;  // good links that alone connect at least two frames with the rest
 
+  // A part whose size the rest of the block does not determine (partition/links/loose_parts.h), the largest first.
+  struct LoosePart {
+    std::vector<FrameIndex> frames;  // without those of the main part and of larger loose parts, ascending
+    std::vector<FrameIndex> joints;  // frames that it shares with other parts; none: no good link leads to it
+    std::int64_t points = 0;         // most tie points of a link that passes the joints
+  };
+  std::vector<LoosePart> loose_parts;
+
   // A position where an exposure is missing, with the attitude of its neighbours.
   struct Proposal {
     Eigen::Vector3d centre;
@@ -99,5 +107,10 @@ struct BlockDiagnostics {
 std::string to_json(const BlockDiagnostics& diagnostics, const Block& block);
 // The same in a few lines of text. Lines at the end name what could not be examined.
 std::string to_text(const BlockDiagnostics& diagnostics, const Block& block);
+// "6 frames ('a', 'b', 'c' and 3 more) share only 'd' with the rest of the block, ...". Without a full stop.
+std::string loose_part_text(const BlockDiagnostics::LoosePart& part, const BlockDiagnostics& diagnostics,
+                            const Block& block);
+// What a reader of the result must not overlook: the loose parts of two frames and more, one line each.
+std::vector<std::string> loose_part_remarks(const BlockDiagnostics& diagnostics, const Block& block);
 
 }  // namespace megablock

@@ -64,7 +64,7 @@ std::string page_of(const BlockResult& result, const report::Figures& figures, c
     context.after_reading();
   };
   add(headline(result, figures));
-  add(assessment(result, figures));
+  add(assessment(result, figures, context.diagnostics));
   add(map_section(result, figures, context.after_reading));
   add(coverage_section(result, figures, context.after_reading));
   add(tie_points_section(result, figures, context.after_reading));

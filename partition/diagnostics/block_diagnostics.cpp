@@ -11,6 +11,7 @@
 #include "geometry/transform/rotation.h"
 #include "partition/diagnostics/ground_cover.h"
 #include "partition/links/link_parts.h"
+#include "partition/links/loose_parts.h"
 #include "partition/views/flight_lines.h"
 #include "partition/views/kd_tree.h"
 
@@ -64,6 +65,7 @@ class Diagnosis {
     if (!found_.aerial) ties_ = gather(false);
     found_.links_known = !ties_.links.empty();
     find_link_parts(block_, state_, ties_.links, found_);
+    find_loose_parts(block_, state_, ties_.links, found_);
     if (found_.aerial) {
       GroundCover cover(found_.footprints, found_.requested.min_images);
       place_exposures();

@@ -1,8 +1,10 @@
 #include "cluster/stages/result/result_files.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <functional>
 #include <future>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -69,7 +71,8 @@ void write_result_files(const JobStore& store, PagedTables& tables, std::uint64_
   store.write(kResult, fingerprint, [&](const std::string& path) { write_result(path, result, announced, release); });
   auto [diagnostics, report] = gathered.get();
   release_all();
-  const ResultFigures figures{report.statistics(), report.remarks(result)};
+  ResultFigures figures{report.statistics(), report.remarks(result)};
+  std::ranges::move(loose_part_remarks(diagnostics, result.block), std::back_inserter(figures.remarks));
   release_all();
   store.write_text(kResultFigures, to_json(figures, result));
   store.write_text(kDiagnostics, to_json(diagnostics, result.block));

@@ -195,11 +195,14 @@ std::string headline(const BlockResult& result, const Figures& f) {
   return "<div class=cards>" + cards + "</div>\n";
 }
 
-std::string assessment(const BlockResult& result, const Figures& f) {
+std::string assessment(const BlockResult& result, const Figures& f, const BlockDiagnostics* diagnostics) {
   std::string list = convergence_item(result) + images_item(result, f) + parts_item(f) + seams_item(result) +
                      unused_points_item(result) + residuals_item(result, f) +
                      points_item(result, f, PointRole::kCheck) + points_item(result, f, PointRole::kControl);
   for (const std::string& text : datum_texts(result, f)) list += item("look", escape(text) + ".");
+  if (diagnostics)
+    for (const std::string& text : loose_part_remarks(*diagnostics, result.block))
+      list += item("look", escape(text) + ".");
   if (!result.gauge.empty()) list += item("plain", "Datum: " + escape(result.gauge) + ".");
   for (const std::string& note : result.notes) list += item("look", escape(note));
   return "<ul class=assessment>\n" + list + "</ul>\n";

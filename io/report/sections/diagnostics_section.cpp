@@ -204,6 +204,9 @@ class DiagnosticsText {
       item(true,
            fmt::format("{} single {} {} parts of the block together.", count_of(d_.single_links),
                        d_.single_links.size() == 1 ? "link" : "links", d_.single_links.size() == 1 ? "holds" : "hold"));
+    if (!d_.loose_parts.empty())
+      item(true, fmt::format("The rest of the block does not determine the size of {} {}.", count_of(d_.loose_parts),
+                             d_.loose_parts.size() == 1 ? "part" : "parts"));
     return "<ul class=assessment>\n" + list + "</ul>\n";
   }
 
@@ -224,7 +227,7 @@ class DiagnosticsText {
 
   std::string tables() const {
     return gaps() + ground() + pairs() + links("Weak links between parts", d_.weak_links, false) +
-           links("Single links", d_.single_links, true);
+           links("Single links", d_.single_links, true) + loose_parts();
   }
 
   std::string chart() const {
@@ -309,6 +312,22 @@ class DiagnosticsText {
                  significant(gap.distance_m)});
     }
     return "<h3>Gaps</h3>" + table.html("small") + more(d_.gaps.size(), kRowsListed);
+  }
+
+  std::string loose_parts() const {
+    if (d_.loose_parts.empty()) return "";
+    const auto names = [&](const std::vector<FrameIndex>& frames) {
+      constexpr std::size_t kNamed = 3;
+      std::string text;
+      for (std::size_t i = 0; i < std::min(kNamed, frames.size()); ++i) text += (i > 0 ? ", " : "") + name(frames[i]);
+      return text + (frames.size() > kNamed ? ", …" : "");
+    };
+    Table table({"frames of the part", "joints", "frames", "tie points of the best link past the joints"}, 2);
+    for (std::size_t i = 0; i < std::min(kRowsListed, d_.loose_parts.size()); ++i) {
+      const auto& part = d_.loose_parts[i];
+      table.add({names(part.frames), names(part.joints), count_of(part.frames), count(part.points)});
+    }
+    return details("Parts of unknown size", table.html("small") + more(d_.loose_parts.size(), kRowsListed));
   }
 
   std::string ground() const {

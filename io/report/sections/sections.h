@@ -25,7 +25,8 @@ std::string ellipses_figure(const BlockResult& result, const Figures& figures,
 // Cards with the main figures: images, points, observations, residual, sigma naught, resolution, tiles, iterations,
 // time.
 std::string headline(const BlockResult& result, const Figures& figures);
-std::string assessment(const BlockResult& result, const Figures& figures);  // strengths and weaknesses
+// Strengths and weaknesses. `diagnostics`: null where the block is not diagnosed.
+std::string assessment(const BlockResult& result, const Figures& figures, const BlockDiagnostics* diagnostics);
 // Maps of the placed frames, and one of each part whose datum is free.
 std::string map_section(const BlockResult& result, const Figures& figures, const std::function<void()>& after_reading);
 std::string coverage_section(const BlockResult& result, const Figures& figures,
