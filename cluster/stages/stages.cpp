@@ -91,11 +91,12 @@ void orientation(const Stage& stage, const Job& job, JobRecord& record, StageRes
     throw AgreedError<ComputeError>(why_nothing_is_oriented(job.block));
 }
 
-// The halves of a split test begin with the focal length of their job.
+// Positions hold a block together although pairs are lost or turned. The halves of a split test begin with the focal
+// length of their job.
 void cameras(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
   const auto better = run_cameras(stage, job, record, results.tiles, results.oriented.state, results.own.block);
   return_freed_memory();
-  if (job.options.half.half != Half::kNone) return;
+  if (job.options.half.half != Half::kNone || !lacks_positions(job.block)) return;
   for (const BetterFocalLength& found : better) {
     if (!keep_focal_length(*find_stage(kFocalLengthStage), job, found.camera, found.focal_px, found.sigma_px)) continue;
     results.begins_again = true;

@@ -16,15 +16,6 @@ namespace megablock {
 
 namespace {
 
-// Positions tell apart what looks alike, so that blocks with positions or poses for half of their frames keep all
-// pairs.
-bool lacks_positions(const Block& block) {
-  const auto placed = std::count_if(block.frames.begin(), block.frames.end(), [](const Frame& frame) {
-    return frame.given_pose.has_value() || frame.position_prior.has_value();
-  });
-  return 2 * placed < std::ssize(block.frames);
-}
-
 struct CellOfMatches {
   std::string name;
   std::size_t first = 0;  // of its pairs among those of all cells
@@ -52,6 +43,13 @@ std::string examples(const Block& block, const std::vector<VerifiedPair>& pairs,
 }
 
 }  // namespace
+
+bool lacks_positions(const Block& block) {
+  const auto placed = std::count_if(block.frames.begin(), block.frames.end(), [](const Frame& frame) {
+    return frame.given_pose.has_value() || frame.position_prior.has_value();
+  });
+  return 2 * placed < std::ssize(block.frames);
+}
 
 std::vector<std::string> run_false_pairs(const Stage& stage, const Job& job, JobRecord& record,
                                          const std::vector<std::string>& matches) {

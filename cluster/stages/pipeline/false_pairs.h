@@ -16,9 +16,12 @@ namespace megablock {
 inline constexpr std::int64_t kMostJudgedImages = 3000;
 
 // Collective. `matches` are the units of the stage of matching. Returns them with those of this stage in place of the
-// cells that hold false pairs, and notes what was left out. Does nothing where half of the frames
-// have positions or poses.
+// cells that hold false pairs, and notes what was left out. Does nothing unless lacks_positions().
 std::vector<std::string> run_false_pairs(const Stage& stage, const Job& job, JobRecord& record,
                                          const std::vector<std::string>& matches);
+
+// Whether fewer than half of the frames have an observed position or a given pose. Others tell apart what looks alike,
+// and hold the block together.
+bool lacks_positions(const Block& block);
 
 }  // namespace megablock
