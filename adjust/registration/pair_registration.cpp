@@ -39,22 +39,22 @@ std::vector<FourFrameTrack> seen_by_enough(const std::vector<FourFrameTrack>& tr
 std::optional<Pose> resect_second_pair(const FourFrames& system, const std::vector<FourFrameTrack>& tracks,
                                        const PairRegistrationOptions& options, std::uint64_t seed) {
   const Pose d_in_c = relative_to(system.pose(2), system.pose(3));
-  std::vector<RigSight> sights;
+  std::vector<ObservedPoint> observations;
   for (std::size_t t = 0; t < tracks.size(); ++t) {
     const auto intersection = system.intersect(tracks[t], 0, 1, 1e3);
     if (!intersection) continue;
     for (const FourFrameTrack::View& view : tracks[t].views) {
       if (view.frame < 2) continue;
-      RigSight sight;
+      ObservedPoint observation;
       // C and D are one rig: the rays of D are taken into the axes of C.
-      sight.ray = view.frame == 2 ? view.ray : carried(view.ray, d_in_c);
-      sight.point = intersection->point;
+      observation.ray = view.frame == 2 ? view.ray : carried(view.ray, d_in_c);
+      observation.point = intersection->point;
       // The base between A and B is not exact, which adds an error in proportion to the distance.
       const double base_error = 0.002 * intersection->point.norm();
-      sight.covariance = intersection->covariance + base_error * base_error * Eigen::Matrix3d::Identity();
-      sight.sigma_px = options.image_sigma_px;
-      sight.id = static_cast<std::int64_t>(t);
-      sights.push_back(sight);
+      observation.covariance = intersection->covariance + base_error * base_error * Eigen::Matrix3d::Identity();
+      observation.sigma_px = options.image_sigma_px;
+      observation.id = static_cast<std::int64_t>(t);
+      observations.push_back(observation);
     }
   }
   RigResectionOptions resection;
@@ -67,7 +67,7 @@ std::optional<Pose> resect_second_pair(const FourFrames& system, const std::vect
   resection.max_position_sigma_m = 1;
   try {
     const ApproximatePose trajectory{system.pose(2), options.max_shift_m / 3, options.max_turn_deg * kDegree / 3};
-    return resect_rig(sights, resection, seed, trajectory).pose;
+    return resect_rig(observations, resection, seed, trajectory).pose;
   } catch (const ComputeError&) {
     return std::nullopt;
   }

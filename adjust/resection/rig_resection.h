@@ -2,7 +2,7 @@
 //
 // Samples of three points give poses by generalised P3P (geometry/resection/gp3p.h), and all observations judge each
 // pose (geometry/estimation/ransac.h). Levenberg-Marquardt iterations over the inliers follow. The residuals are
-// whitened by the covariances of observation and point (rig_sights.h), so that the sigmas of the points enter the
+// whitened by the covariances of observation and point (observed_points.h), so that the sigmas of the points enter the
 // choice, the weights and the covariance of the pose. An approximate pose, such as that of the trajectory, takes part
 // as an observation with its sigmas. It decides between the solutions of three points and stabilises configurations
 // near a critical surface.
@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "adjust/resection/rig_sights.h"
+#include "adjust/resection/observed_points.h"
 
 namespace megablock {
 
@@ -51,7 +51,7 @@ struct RigResection {
 // Deterministic: samples depend on `seed` and on the order of the observations alone. Throws ComputeError with the
 // reason: fewer than three points, points on one line, no pose with enough inliers, several possible poses, or a
 // position that is not determined.
-RigResection resect_rig(std::span<const RigSight> sights, const RigResectionOptions& options, std::uint64_t seed,
-                        const std::optional<ApproximatePose>& approximate = {});
+RigResection resect_rig(std::span<const ObservedPoint> observations, const RigResectionOptions& options,
+                        std::uint64_t seed, const std::optional<ApproximatePose>& approximate = {});
 
 }  // namespace megablock

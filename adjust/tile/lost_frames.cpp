@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "adjust/resection/rig_sights.h"
+#include "adjust/resection/observed_points.h"
 
 namespace megablock {
 
@@ -50,12 +50,12 @@ class Resection {
 
   std::optional<Pose> find(const std::vector<std::int64_t>& rows, std::uint64_t seed) const {
     // Scoring every sample by 300 observations is enough to find the pose. All observations then judge it.
-    constexpr std::size_t kMaxSights = 300;
-    std::vector<RigSight> sights;
-    const std::size_t stride = 1 + (rows.size() - 1) / kMaxSights;
+    constexpr std::size_t kMostObservations = 300;
+    std::vector<ObservedPoint> observations;
+    const std::size_t stride = 1 + (rows.size() - 1) / kMostObservations;
     for (std::size_t i = 0; i < rows.size(); i += stride)
-      if (const auto sight = sight_of(rows[i])) sights.push_back(*sight);
-    const std::optional<Pose> found = find_lost_pose(sights, threshold_, seed);
+      if (const auto observation = observation_of(rows[i])) observations.push_back(*observation);
+    const std::optional<Pose> found = find_lost_pose(observations, threshold_, seed);
     if (!found) return std::nullopt;
     const std::size_t agree = agreeing(*found, rows);
     const bool enough = agree >= kMinAgreeing && static_cast<double>(agree) >= kMinShare * std::ssize(rows);
@@ -78,14 +78,14 @@ class Resection {
            threshold_;
   }
 
-  std::optional<RigSight> sight_of(std::int64_t row) const {
+  std::optional<ObservedPoint> observation_of(std::int64_t row) const {
     const TileImage& image = image_of(row);
     const auto ray =
         rig_ray(state_.mounts[image.mount], state_.cameras[image.camera.value], {problem_.x[row], problem_.y[row]});
     if (!ray) return std::nullopt;
     const std::int64_t point = point_of_row_[row];
     // The points count as exact: thresholds here are many times their errors.
-    return RigSight{*ray, state_.points[point], Eigen::Matrix3d::Zero(), 1 / problem_.inverse_sigma[row], point};
+    return ObservedPoint{*ray, state_.points[point], Eigen::Matrix3d::Zero(), 1 / problem_.inverse_sigma[row], point};
   }
 
   const TileProblem& problem_;

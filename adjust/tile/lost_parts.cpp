@@ -16,7 +16,7 @@
 #include <map>
 #include <optional>
 
-#include "adjust/resection/rig_sights.h"
+#include "adjust/resection/observed_points.h"
 #include "io/base/disjoint_sets.h"
 
 namespace megablock {
@@ -112,9 +112,9 @@ class PartFinder {
   // Moves the part and lets it stand, if its place is found.
   bool find(const std::vector<std::int64_t>& frames) {
     mark(frames);
-    const std::vector<RigSight> sights = sights_of_part();
-    const std::optional<Pose> pose =
-        place(sights, static_cast<std::uint64_t>(problem_.frames[static_cast<std::size_t>(frames.front())].value));
+    const std::vector<ObservedPoint> observations = observations_of_part();
+    const std::optional<Pose> pose = place(
+        observations, static_cast<std::uint64_t>(problem_.frames[static_cast<std::size_t>(frames.front())].value));
     if (!pose) return false;
     move(frames, *pose);
     let_stand(frames);
@@ -145,8 +145,8 @@ class PartFinder {
   }
 
   // The observations that the part has of standing points, as those of one rig in ground axes.
-  std::vector<RigSight> sights_of_part() const {
-    std::vector<RigSight> sights;
+  std::vector<ObservedPoint> observations_of_part() const {
+    std::vector<ObservedPoint> observations;
     for (std::int64_t p = 0; p < problem_.point_count(); ++p) {
       if (!stands(p)) continue;
       for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row) {
@@ -155,33 +155,35 @@ class PartFinder {
         const auto ray =
             rig_ray(state_.mounts[image.mount], state_.cameras[image.camera.value], {problem_.x[row], problem_.y[row]});
         if (ray)
-          sights.push_back({carried(*ray, state_.frames[image.frame.value]), state_.points[p], Eigen::Matrix3d::Zero(),
-                            1 / problem_.inverse_sigma[row], p});
+          observations.push_back({carried(*ray, state_.frames[image.frame.value]), state_.points[p],
+                                  Eigen::Matrix3d::Zero(), 1 / problem_.inverse_sigma[row], p});
       }
     }
-    return sights;
+    return observations;
   }
 
-  std::size_t agreeing(const std::vector<RigSight>& sights, const Pose& pose) const {
-    return static_cast<std::size_t>(std::count_if(sights.begin(), sights.end(), [&](const RigSight& sight) {
-      const auto residual = whitened(sight, pose, false);
-      return residual && residual->residual.norm() <= threshold_;
-    }));
+  std::size_t agreeing(const std::vector<ObservedPoint>& observations, const Pose& pose) const {
+    return static_cast<std::size_t>(
+        std::count_if(observations.begin(), observations.end(), [&](const ObservedPoint& observation) {
+          const auto residual = whitened(observation, pose, false);
+          return residual && residual->residual.norm() <= threshold_;
+        }));
   }
 
   // The pose from the correct ground axes to those in which the part is now. Empty where enough observations agree
   // already, or where too few agree with any pose.
-  std::optional<Pose> place(const std::vector<RigSight>& sights, std::uint64_t seed) const {
-    constexpr std::size_t kMostSights = 500;
+  std::optional<Pose> place(const std::vector<ObservedPoint>& observations, std::uint64_t seed) const {
+    constexpr std::size_t kMostObservations = 500;
     const auto enough = [&](std::size_t agree) {
       return agree >= kFewestAgreeing &&
-             static_cast<double>(agree) >= kAgreeingShare * static_cast<double>(sights.size());
+             static_cast<double>(agree) >= kAgreeingShare * static_cast<double>(observations.size());
     };
-    if (sights.size() < kFewestAgreeing || enough(agreeing(sights, Pose{}))) return std::nullopt;
-    std::vector<RigSight> some;
-    for (std::size_t i = 0; i < sights.size(); i += 1 + (sights.size() - 1) / kMostSights) some.push_back(sights[i]);
+    if (observations.size() < kFewestAgreeing || enough(agreeing(observations, Pose{}))) return std::nullopt;
+    std::vector<ObservedPoint> some;
+    for (std::size_t i = 0; i < observations.size(); i += 1 + (observations.size() - 1) / kMostObservations)
+      some.push_back(observations[i]);
     const std::optional<Pose> found = find_lost_pose(some, threshold_, seed);
-    return found && enough(agreeing(sights, *found)) ? found : std::nullopt;
+    return found && enough(agreeing(observations, *found)) ? found : std::nullopt;
   }
 
   // X_now = R (X - C) for the correct X. Moves the frames of the part, and the points that it alone keeps, to X.

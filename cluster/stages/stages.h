@@ -19,7 +19,7 @@ struct StageResults {
 
   JobBlock& own;                      // the block of the job: names come and go, orientation and merge take of it
   std::string tie_points;             // file of given tie points, before all stages; empty: the job starts from images
-  bool needs_tiles = true;            // before all stages: a block without verified matches ends the run
+  bool needs_tiles = true;            // set before all stages; if true, a block without tiles ends the run
   FeatureStage features;              // features
   CandidateGraph candidates;          // candidates
   std::vector<std::string> matches;   // matching: units by cell; false_pairs replaces those without pairs that it drops

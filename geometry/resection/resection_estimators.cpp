@@ -6,7 +6,7 @@
 namespace megablock {
 
 Solutions<Pose, 8> ResectionEstimator::solve(const std::array<std::size_t, 3>& rows) const {
-  const RaySight &a = sights_[rows[0]], &b = sights_[rows[1]], &c = sights_[rows[2]];
+  const PointRay &a = rays_[rows[0]], &b = rays_[rows[1]], &c = rays_[rows[2]];
   return solve_gp3p({a.origin, b.origin, c.origin}, {a.direction, b.direction, c.direction},
                     {a.point, b.point, c.point});
 }
@@ -30,11 +30,11 @@ Pose ResectionEstimator::adjusted(Pose pose, double threshold, int max_iteration
     PoseIncrement right = PoseIncrement::Zero();
     // Normal equations of the unknown increment (w, d) of the pose, from the residual u - v, where u is the unit
     // direction to the point and v the measured one. d(u) / d(point in the rig) = (I - u u') / distance.
-    for (const RaySight& sight : sights_) {
-      const Eigen::Vector3d difference = sight.point - pose.centre;
-      const Eigen::Vector3d inside = rotation * difference - sight.origin;
+    for (const PointRay& ray : rays_) {
+      const Eigen::Vector3d difference = ray.point - pose.centre;
+      const Eigen::Vector3d inside = rotation * difference - ray.origin;
       const double distance = inside.norm();
-      const Eigen::Vector3d unit = inside / distance, residual = unit - sight.direction;
+      const Eigen::Vector3d unit = inside / distance, residual = unit - ray.direction;
       if (!(residual.squaredNorm() <= 4 * limit)) continue;
       const Eigen::Matrix3d by_centre = -(Eigen::Matrix3d::Identity() - unit * unit.transpose()) / distance * rotation;
       Eigen::Matrix<double, 3, 6> by_pose;

@@ -19,7 +19,7 @@
 namespace megablock {
 
 // One measured ray and the point it is directed to.
-struct RaySight {
+struct PointRay {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // projection centre in the rig, metres
   Eigen::Vector3d direction;                         // unit vector, rig axes
   Eigen::Vector3d point;                             // ground frame, metres
@@ -29,17 +29,17 @@ class ResectionEstimator {
  public:
   using Model = Pose;  // ground -> rig
   static constexpr std::size_t kSampleSize = 3;
-  // `sights` must outlive the estimator. Elements that are not finite never count as inliers.
-  explicit ResectionEstimator(std::span<const RaySight> sights) : sights_(sights) {}
-  std::size_t size() const { return sights_.size(); }
+  // `rays` must outlive the estimator. Elements that are not finite never count as inliers.
+  explicit ResectionEstimator(std::span<const PointRay> rays) : rays_(rays) {}
+  std::size_t size() const { return rays_.size(); }
   Solutions<Pose, 8> solve(const std::array<std::size_t, 3>& rows) const;
   // Squared length of the difference of two unit directions; for small differences its root is the angle in radians.
   auto squared_residuals(const Pose& pose) const {
-    return [sights = sights_, centre = pose.centre,
+    return [rays = rays_, centre = pose.centre,
             rotation = Eigen::Matrix3d(pose.rotation.toRotationMatrix())](std::size_t i) {
-      const RaySight& sight = sights[i];
-      const Eigen::Vector3d inside = rotation * (sight.point - centre) - sight.origin;
-      return (inside / inside.norm() - sight.direction).squaredNorm();
+      const PointRay& ray = rays[i];
+      const Eigen::Vector3d inside = rotation * (ray.point - centre) - ray.origin;
+      return (inside / inside.norm() - ray.direction).squaredNorm();
     };
   }
   std::optional<Pose> refine(const Pose& pose, double threshold) const { return adjusted(pose, threshold, 3); }
@@ -49,7 +49,7 @@ class ResectionEstimator {
 
  private:
   double cost(const Pose& pose, double threshold) const;
-  std::span<const RaySight> sights_;
+  std::span<const PointRay> rays_;
 };
 
 }  // namespace megablock

@@ -16,7 +16,7 @@
 // u. The tile has the equations S (x + E v), E the columns of u, and the rest those of x. Eliminating x leaves A v = g
 // with
 //
-//     A = S_uu - S_u C S_u',    g = s_u - S_u C (s - s) = s_u,
+//     A = S_uu - S_u C S_u',    g = s_u,
 //
 // where S_u C S_u' = (F'S_u')'(F'S_u'): `seen` is F'S, and every u takes only its columns.
 #include "merge/checks/seam_check.h"

@@ -54,11 +54,11 @@ CellAssembler::CellAssembler(const TilePlan& plan, Front& front, PairBlocks& pai
 void CellAssembler::add_points(PointEquations& equations) {
   equations.reduce(frames_);
   const std::vector<PointEquations::Point>& points = equations.points();
-  const std::int64_t sights = equations.sight_count();
-  sight_frames_.resize(at(sights));
-  for (std::int64_t sight = 0; sight < sights; ++sight)
-    sight_frames_[at(sight)] = numbers_[at(equations.frame_of(sight))];
-  equations.kernels().subtract_pairs(std::ssize(points), equations.begin(), equations.y(0), sight_frames_.data(),
+  const std::int64_t groups = equations.group_count();
+  group_frames_.resize(at(groups));
+  for (std::int64_t group = 0; group < groups; ++group)
+    group_frames_[at(group)] = numbers_[at(equations.frame_of(group))];
+  equations.kernels().subtract_pairs(std::ssize(points), equations.begin(), equations.y(0), group_frames_.data(),
                                      pair_blocks_.pairs());
   for (std::size_t i = 0; i < points.size(); ++i)
     if (points[i].shared_end > points[i].shared_begin) add_shared(equations, i);
@@ -112,7 +112,7 @@ void CellAssembler::add_shared(const PointEquations& equations, std::size_t i) {
   }
   // The frames come first in the list. Pairs of frames are done already, so b begins behind them.
   equations.blocks(i, blocks_);
-  for (std::size_t b = at(point.sight_count()); b < blocks_.size(); ++b) {
+  for (std::size_t b = at(point.group_count()); b < blocks_.size(); ++b) {
     const PointEquations::Block& block = blocks_[b];
     for (std::size_t a = 0; a <= b; ++a)
       subtract_outer(kernels, {block.unknown, block.dimension, block.dimension, block.y},

@@ -68,7 +68,7 @@ class CellAssembler {
   std::vector<std::int64_t> frame_rows_;       // rows of the cell's frames in the front, ascending
   std::vector<std::int64_t> numbers_;          // [plan.unknowns] number of each frame among frame_rows_
   PairBlocks& pair_blocks_;                    // by these numbers
-  std::vector<std::int64_t> sight_frames_;     // [groups] numbers of the frames of the present points
+  std::vector<std::int64_t> group_frames_;     // [groups] numbers of the frames of the present points
 };
 
 }  // namespace megablock

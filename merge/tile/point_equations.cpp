@@ -114,9 +114,9 @@ PointEquations::PointEquations(const TileProblem& problem, const TileState& stat
   lane_unknowns_.resize(at(room));
   shared_rows_.resize(at(room));
   squares_.resize(at(room));
-  sight_of_lane_.resize(at(room));
-  sight_frames_.resize(at(room));
-  step_of_sight_.resize(at(room));
+  group_of_lane_.resize(at(room));
+  group_frames_.resize(at(room));
+  step_of_group_.resize(at(room));
   frame_sums_.resize(at(room));
   motions_.resize(at(room));
   begin_.resize(at(room + 1));
@@ -143,7 +143,7 @@ std::size_t PointEquations::linearise(std::span<const std::int32_t> points, cons
   lanes_.linearise();
   for (Point& point : points_) weigh(point, sweep.curvature);
   kernels_->normal(lanes_.values(), lanes_.capacity(), lanes_.padded_size(), records_.data());
-  if (sights_ < lanes_.size()) kernels_->merge(lanes_.size(), sight_of_lane_.data(), records_.data());
+  if (groups_ < lanes_.size()) kernels_->merge(lanes_.size(), group_of_lane_.data(), records_.data());
   sum_up(sweep.curvature);
   kernels_->factorise(padded_points(), sweep.lambda, kPivotTolerance * (1 + sweep.lambda), sums_.data(),
                       {point_values_.data(), lanes_.capacity()}, steps_.data());
@@ -153,7 +153,7 @@ std::size_t PointEquations::linearise(std::span<const std::int32_t> points, cons
 void PointEquations::clear() {
   points_.clear();
   lanes_.clear();
-  sights_ = 0;
+  groups_ = 0;
   shared_.clear();
   taken_ = 0;
 }
@@ -181,7 +181,7 @@ void PointEquations::add_observations(std::int64_t point) {
   Point& added = points_.emplace_back();
   added.point = point;
   added.first = lanes_.size();
-  added.first_sight = sights_;
+  added.first_group = groups_;
   const std::int64_t begin = problem_.begin[at(point)], end = problem_.begin[at(point + 1)];
   std::int64_t* rows = rows_.data() + added.first;
   // The loop has no branch: each row is written, and the place moves on only behind a kept one.
@@ -198,35 +198,35 @@ void PointEquations::add_observations(std::int64_t point) {
       return std::pair(frame_of_row(a), a) < std::pair(frame_of_row(b), b);
     });
     lanes_.clear_from(added.first);
-    sights_ = added.first_sight;
+    groups_ = added.first_group;
     add_lanes(added.first, count, state_.points[at(point)]);
   }
   added.last = lanes_.size();
-  added.last_sight = sights_;
+  added.last_group = groups_;
 }
 
 // Adds the observations of the last point, whose rows are in rows_. Observations of one frame that follow each other
-// form a group (`sight`). The loop has no branch for it, because the processor could not predict it. Returns whether
+// form a group. The loop has no branch for it, because the processor could not predict it. Returns whether
 // the frames are in ascending order.
 bool PointEquations::add_lanes(std::int64_t first, std::int64_t count, const Eigen::Vector3d& point) {
   const double* step = steps_.data() + (std::ssize(points_) - 1) * kRecordSize;
-  std::int64_t sight = sights_ - 1;
+  std::int64_t group = groups_ - 1;
   std::int32_t last = -1;
   bool ascending = true;
   for (std::int64_t lane = first; lane < first + count; ++lane) {
     const std::int64_t row = rows_[at(lane)], image = problem_.image[at(row)].value;
     const std::int32_t frame = frames_[at(image)];
-    sight += frame != last;
+    group += frame != last;
     ascending &= frame >= last;
     last = frame;
     lane_unknowns_[at(lane)] = &unknowns_[at(image)];
-    sight_of_lane_[at(lane)] = sight;
-    sight_frames_[at(sight)] = frame;
-    step_of_sight_[at(sight)] = step;
+    group_of_lane_[at(lane)] = group;
+    group_frames_[at(group)] = frame;
+    step_of_group_[at(group)] = step;
     lanes_.add(lane_views_[at(image)], point, problem_.x[at(row)], problem_.y[at(row)],
                problem_.inverse_sigma[at(row)]);
   }
-  sights_ = sight + 1;
+  groups_ = group + 1;
   return ascending;
 }
 
@@ -347,8 +347,8 @@ void PointEquations::add_to_shared(std::int64_t unknown, int dimension, const do
 
 // Sums V and b of the points, and adds their priors.
 void PointEquations::sum_up(bool curvature) {
-  for (std::size_t i = 0; i < points_.size(); ++i) begin_[i] = points_[i].first_sight;
-  begin_[points_.size()] = sights_;
+  for (std::size_t i = 0; i < points_.size(); ++i) begin_[i] = points_[i].first_group;
+  begin_[points_.size()] = groups_;
   kernels_->sum(std::ssize(points_), begin_.data(), records_.data(), sums_.data());
   std::fill(sums_.data() + std::ssize(points_) * kRecordSize, sums_.data() + padded_points() * kRecordSize, 0.0);
   for (std::size_t i = 0; i < points_.size(); ++i)
@@ -379,11 +379,11 @@ void PointEquations::add_prior(std::size_t i, bool curvature) {
 // reads.
 void PointEquations::reduce(std::vector<FrameSum>& sums) {
   FrameSum unused;
-  const std::int64_t padded = lane_kernels::padded(sights_);
-  std::fill(step_of_sight_.begin() + sights_, step_of_sight_.begin() + padded, steps_.data());
-  for (std::int64_t sight = 0; sight < padded; ++sight)
-    frame_sums_[at(sight)] = sight < sights_ ? sums[at(frame_of(sight))].values.data() : unused.values.data();
-  kernels_->reduce(records_.data(), padded, step_of_sight_.data(), y_.data(), frame_sums_.data());
+  const std::int64_t padded = lane_kernels::padded(groups_);
+  std::fill(step_of_group_.begin() + groups_, step_of_group_.begin() + padded, steps_.data());
+  for (std::int64_t group = 0; group < padded; ++group)
+    frame_sums_[at(group)] = group < groups_ ? sums[at(frame_of(group))].values.data() : unused.values.data();
+  kernels_->reduce(records_.data(), padded, step_of_group_.data(), y_.data(), frame_sums_.data());
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& point = points_[i];
     for (std::int64_t k = point.shared_begin; k < point.shared_end; ++k) {
@@ -396,15 +396,15 @@ void PointEquations::reduce(std::vector<FrameSum>& sums) {
 
 void PointEquations::steps(const UnknownMotions& motions, std::vector<Eigen::Vector3d>& out) {
   // b - sum W_i'x_i: the frames by the kernel, V_f G x_f = -V_f (u x w + t), the shared unknowns here.
-  const std::int64_t padded = lane_kernels::padded(sights_);
-  for (std::int64_t sight = 0; sight < padded; ++sight)
-    motions_[at(sight)] = motions.of_frame(frame_of(std::min(sight, sights_ - 1)));
+  const std::int64_t padded = lane_kernels::padded(groups_);
+  for (std::int64_t group = 0; group < padded; ++group)
+    motions_[at(group)] = motions.of_frame(frame_of(std::min(group, groups_ - 1)));
   kernels_->move(records_.data(), padded, motions_.data(), moved_.data(), lanes_.capacity());
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& point = points_[i];
     std::array<double, 3> rest{};
-    for (std::int64_t sight = point.first_sight; sight < point.last_sight; ++sight)  // -G x_f = u x w + t
-      for (int k = 0; k < 3; ++k) rest[at(k)] += moved_.data()[k * lanes_.capacity() + sight];
+    for (std::int64_t group = point.first_group; group < point.last_group; ++group)  // -G x_f = u x w + t
+      for (int k = 0; k < 3; ++k) rest[at(k)] += moved_.data()[k * lanes_.capacity() + group];
     for (std::int64_t s = point.shared_begin; s < point.shared_end; ++s) {
       const SharedPart& part = shared_[at(s)];
       const double* x = motions.of(part.unknown);
@@ -462,8 +462,8 @@ Eigen::Vector3d PointEquations::diagonal(std::size_t i) const {
 void PointEquations::blocks(std::size_t i, std::vector<Block>& list) const {
   const Point& point = points_[i];
   list.clear();
-  for (std::int64_t sight = point.first_sight; sight < point.last_sight; ++sight)
-    list.push_back({frame_of(sight), 6, y(sight)});
+  for (std::int64_t group = point.first_group; group < point.last_group; ++group)
+    list.push_back({frame_of(group), 6, y(group)});
   for (std::int64_t k = point.shared_begin; k < point.shared_end; ++k)
     list.push_back({shared_[at(k)].unknown, shared_[at(k)].dimension, shared_[at(k)].y});
 }

@@ -17,7 +17,7 @@
 // A prior of the point is added to V and b.
 //
 // Many points are processed at once, by kernels over observations, over groups of observations, and over points
-// (point_kernels.h). A group, `sight` in the code, holds the observations of a point in one frame: in one image, or in
+// (point_kernels.h). A group holds the observations of a point in one frame: in one image, or in
 // several cameras of a rig. It has one V_f, one b_f and one u, which no mount changes.
 #pragma once
 
@@ -82,16 +82,16 @@ struct PointTables {
 class PointEquations {
  public:
   using Rows3 = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>>;
-  // One of the present points. Its observations are the lanes [first, last), its groups [first_sight, last_sight).
+  // One of the present points. Its observations are the lanes [first, last), its groups [first_group, last_group).
   struct Point {
     std::int64_t point = -1;
     std::int64_t first = 0, last = 0;
-    std::int64_t first_sight = 0, last_sight = 0;
+    std::int64_t first_group = 0, last_group = 0;
     std::int64_t shared_begin = 0, shared_end = 0;
     double rho = 0, weighted_squares = 0;
     std::int64_t residual_count = 0;
     std::int64_t observation_count() const { return last - first; }
-    std::int64_t sight_count() const { return last_sight - first_sight; }
+    std::int64_t group_count() const { return last_group - first_group; }
   };
   // An unknown in the residuals of the point.
   struct Block {
@@ -130,10 +130,10 @@ class PointEquations {
   Eigen::Matrix<double, 2, 3> by_point(std::int64_t lane) const { return lanes_.by_point(lane); }  // J_p
   std::int64_t row_of(std::int64_t lane) const { return rows_[at(lane)]; }                         // row in the problem
   const SharedRows& shared(std::int64_t lane) const { return shared_rows_[at(lane)]; }
-  const double* y(std::int64_t sight) const { return y_.data() + sight * point_kernels::kYSize; }
+  const double* y(std::int64_t group) const { return y_.data() + group * point_kernels::kYSize; }
   const std::int64_t* begin() const { return begin_.data(); }  // [points() + 1] first group of each point
-  std::int64_t sight_count() const { return sights_; }
-  std::int64_t frame_of(std::int64_t sight) const { return sight_frames_[at(sight)]; }  // position in plan.unknowns
+  std::int64_t group_count() const { return groups_; }
+  std::int64_t frame_of(std::int64_t group) const { return group_frames_[at(group)]; }  // position in plan.unknowns
   const point_kernels::Kernels& kernels() const { return *kernels_; }
 
   // These three take the number i of a point in points().
@@ -199,10 +199,10 @@ class PointEquations {
   std::vector<const ImageUnknowns*> lane_unknowns_;  // [lanes]
   std::vector<SharedRows> shared_rows_;              // [lanes]
   std::vector<double> squares_;                      // [lanes]
-  std::vector<std::int64_t> sight_of_lane_;          // [lanes] number of the group
-  std::int64_t sights_ = 0;
-  std::vector<std::int32_t> sight_frames_;    // [groups] positions in plan.unknowns
-  std::vector<const double*> step_of_sight_;  // [groups] records in steps_
+  std::vector<std::int64_t> group_of_lane_;          // [lanes] number of the group
+  std::int64_t groups_ = 0;
+  std::vector<std::int32_t> group_frames_;    // [groups] positions in plan.unknowns
+  std::vector<const double*> step_of_group_;  // [groups] records in steps_
   std::vector<double*> frame_sums_;           // [groups]
   std::vector<const double*> motions_;        // [groups]
   AlignedValues records_;                     // [lanes, then groups x kRecordSize]

@@ -1,5 +1,5 @@
 // Declares the loops over lanes of point_equations.h, on raw pointers. Lanes hold observations
-// (adjust/lanes/observation_lanes.h), the observations of a point in one frame (`sight`), or points. Symmetric 3 x 3
+// (adjust/lanes/observation_lanes.h), the observations of a point in one frame (a group), or points. Symmetric 3 x 3
 // matrices are stored by the rows of their lower triangle (6 values), and triangular ones in the same way.
 //
 // Two layouts meet here. Where all lanes do the same arithmetic, a value has a column over the lanes (Columns). Where
@@ -17,7 +17,7 @@ struct Columns {
   std::int64_t stride;
 };
 
-// The values of an observation, of a `sight` or of a point side by side: V, b and, except for points, u.
+// The values of an observation, of a group or of a point side by side: V, b and, except for points, u.
 enum RecordValue : int { kV = 0, kB = 6, kU = 9 };
 constexpr int kRecordSize = 16;  // the rest is 0; in the sum over a point u has no meaning
 // The values of a point.
@@ -33,7 +33,7 @@ enum PointValue : int {
 
 constexpr int kYStride = 6;  // Y of a frame: [6 x 3] column by column
 constexpr int kYSize = 24;   // values of one Y in memory, the last 6 unused
-// The contribution of a `sight` to its frame (cell_assembler.h), with R = V_f - T T' and T = V_f C^-T: [u]x R [u]x' and
+// The contribution of a group to its frame (cell_assembler.h), with R = V_f - T T' and T = V_f C^-T: [u]x R [u]x' and
 // R (lower triangles by rows), [u]x R by rows without its last element (its trace is 0), the diagonal of G'V_f G, and
 // G'(b_f - T z).
 enum FrameValue : int {
@@ -60,16 +60,16 @@ struct Pairs {
 struct Kernels {
   // Makes the records of observations from residuals, u and J_p (`linearised`: rows of lane_kernels::Value).
   void (*normal)(const double* linearised, std::int64_t linearised_stride, std::int64_t count, double* records);
-  // Makes the records of `sight`s from those of their observations, in place. V and b are sums; u is the same for all
-  // observations of a `sight`. For observation k, `sight`[k] is that of the observation before it, or the next number.
-  void (*merge)(std::int64_t count, const std::int64_t* sight, double* records);
+  // Makes the records of groups from those of their observations, in place. V and b are sums; u is the same for all
+  // observations of a group. For observation k, group[k] is that of the observation before it, or the next number.
+  void (*merge)(std::int64_t count, const std::int64_t* group, double* records);
   // Sums the records from begin[p] to begin[p + 1] for each point p, into records.
   void (*sum)(std::int64_t points, const std::int64_t* begin, const double* records, double* sums);
   // Factorises V of points. Fills all their values from the records of V and b, and writes C^-1 (6) and V^-1 b (3) as
   // the first values of a record for each point. A pivot of at most floor * V_kk is held.
   void (*factorise)(std::int64_t count, double lambda, double floor, const double* sums, const Columns& points,
                     double* steps);
-  // Computes Y of every `sight` [count x kYSize], and adds to the sums of its frame. `steps` points to the record that
+  // Computes Y of every group [count x kYSize], and adds to the sums of its frame. `steps` points to the record that
   // factorise wrote for the point of each.
   void (*reduce)(const double* records, std::int64_t count, const double* const* steps, double* y,
                  double* const* frames);

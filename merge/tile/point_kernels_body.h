@@ -76,7 +76,7 @@ void normal(const double* linearised, std::int64_t linearised_stride, std::int64
 // The loop has no branches, because the processor cannot predict which observations belong to one frame. Each record
 // becomes the sum of its group so far and is stored at the place of the group; the last one of a group stays there.
 // Groups never have higher numbers than their observations, so no record is overwritten before it is read.
-void merge(std::int64_t count, const std::int64_t* sight, double* records) {
+void merge(std::int64_t count, const std::int64_t* group, double* records) {
   constexpr int kLast = kB + 2;  // last value that is summed
   constexpr int kVectors = kRecordSize / kWidth;
   Lanes sums[kVectors]{};
@@ -85,14 +85,14 @@ void merge(std::int64_t count, const std::int64_t* sight, double* records) {
   for (int k = 0; k < kRecordSize; ++k) summed[k / kWidth][k % kWidth] = k <= kLast ? -1 : 0;
   std::int64_t before = -1;
   for (std::int64_t i = 0; i < count; ++i) {
-    const LaneMask goes_on = LaneMask{} - (sight[i] == before);
-    before = sight[i];
+    const LaneMask goes_on = LaneMask{} - (group[i] == before);
+    before = group[i];
 #pragma GCC unroll 64
     for (int k = 0; k < kVectors; ++k) {
       // The sum goes on within a group and begins anew behind it. u is taken from the present observation in any case.
       const LaneMask kept = reinterpret_cast<LaneMask>(sums[k]) & goes_on & summed[k];
       sums[k] = load(records + i * kRecordSize + k * kWidth) + reinterpret_cast<Lanes>(kept);
-      store(records + sight[i] * kRecordSize + k * kWidth, sums[k]);
+      store(records + group[i] * kRecordSize + k * kWidth, sums[k]);
     }
   }
 }
@@ -162,11 +162,11 @@ void factorise(std::int64_t count, double lambda, double floor, const double* su
 }
 
 // V, b and u of one group of lanes.
-struct Sights {
+struct Groups {
   Lanes values[kRecordSize];
   const Lanes *v = values + kV, *b = values + kB;
   Lanes u[3];
-  [[gnu::always_inline]] explicit Sights(const double* records) {
+  [[gnu::always_inline]] explicit Groups(const double* records) {
     read_records(
         [&](int lane) __attribute__((always_inline)) { return records + lane * kRecordSize; }, values);
 #pragma GCC unroll 64
@@ -177,9 +177,9 @@ struct Sights {
 // `step` is C^-T z, the step of the point when all frames stay, so that T z is V_f times it.
 void reduce(const double* records, std::int64_t count, const double* const* steps, double* y, double* const* frames) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
-    const Sights sights(records + i * kRecordSize);
-    const Lanes *v = sights.v, *b = sights.b;
-    const Lanes(&u)[3] = sights.u;
+    const Groups groups(records + i * kRecordSize);
+    const Lanes *v = groups.v, *b = groups.b;
+    const Lanes(&u)[3] = groups.u;
     Lanes of_point[kRecordSize];
     read_records(
         [&](int lane) __attribute__((always_inline)) { return steps[i + lane]; }, of_point);
@@ -264,12 +264,12 @@ void reduce(const double* records, std::int64_t count, const double* const* step
 void move(const double* records, std::int64_t count, const double* const* motions, double* out,
           std::int64_t out_stride) {
   for (std::int64_t i = 0; i < count; i += kWidth) {
-    const Sights sights(records + i * kRecordSize);
-    const Lanes* v = sights.v;
+    const Groups groups(records + i * kRecordSize);
+    const Lanes* v = groups.v;
     Lanes motion[8], turned[3];
     read_records(
         [&](int lane) __attribute__((always_inline)) { return motions[i + lane]; }, motion);
-    cross(sights.u, motion[0], motion[1], motion[2], turned);
+    cross(groups.u, motion[0], motion[1], motion[2], turned);
 #pragma GCC unroll 64
     for (int k = 0; k < 3; ++k) turned[k] += motion[3 + k];
 #pragma GCC unroll 64

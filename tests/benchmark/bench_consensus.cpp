@@ -80,7 +80,7 @@ BENCHMARK(frame_by_p3p)->ArgName("wrong_%")->Arg(0)->Arg(30)->Arg(60)->Unit(benc
 
 // Ten cameras, some 25 points of 2 cm, 4 to 12 m away.
 struct RigScene {
-  std::vector<RigSight> sights;
+  std::vector<ObservedPoint> observations;
   Pose truth;
   RigScene(double wrong, std::uint64_t seed) {
     Noise noise(seed);
@@ -93,7 +93,7 @@ struct RigScene {
       if (!seen) continue;
       point +=
           noise.uniform(0, 1) < wrong ? Eigen::Vector3d(3 * noise.triple()) : Eigen::Vector3d(0.02 * noise.triple());
-      sights.push_back(
+      observations.push_back(
           {street_rig().ray(*seen, 0.5 * noise.pair()), point, 4e-4 * Eigen::Matrix3d::Identity(), 0.5, i});
     }
   }
@@ -103,7 +103,7 @@ void rig_by_gp3p(benchmark::State& state) {
     try {
       RigResectionOptions options;
       options.min_share = 0.3;
-      return (resect_rig(scene.sights, options, 1).pose.centre - scene.truth.centre).norm();
+      return (resect_rig(scene.observations, options, 1).pose.centre - scene.truth.centre).norm();
     } catch (const std::exception&) {
       return std::nullopt;
     }

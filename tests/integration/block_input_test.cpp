@@ -231,7 +231,7 @@ TEST_F(BlockInput, OneImage) {
   SimulatedBlock s = simulate_block(options);
   keep_observations(s, [](std::size_t) { return false; });
   folder_.write(s, kTiles);
-  EXPECT_THAT([&] { folder_.run(); }, testing::ThrowsMessage<Error>(HasSubstr("no two images could be matched")));
+  EXPECT_THAT([&] { folder_.run(); }, testing::ThrowsMessage<Error>(HasSubstr("no two frames are held together")));
 }
 
 // Sigmas of zero, below, and none at all.

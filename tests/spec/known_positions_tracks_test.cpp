@@ -20,8 +20,8 @@
 namespace megablock {
 namespace {
 
-using Sighting = std::pair<std::int64_t, std::int32_t>;  // image, feature
-using SightingSets = std::set<std::vector<Sighting>>;
+using ImageFeature = std::pair<std::int64_t, std::int32_t>;  // image, feature
+using FeatureSets = std::set<std::vector<ImageFeature>>;
 
 constexpr std::int64_t kImages = 20;
 constexpr std::int32_t kFeatures = 400;
@@ -59,21 +59,21 @@ std::vector<VerifiedPair> incomplete_pairs(std::mt19937_64& random) {
 }
 
 // Connected components, by walking through the graph.
-SightingSets components_of(const std::vector<VerifiedPair>& pairs) {
-  std::map<Sighting, std::vector<Sighting>> edges;
+FeatureSets components_of(const std::vector<VerifiedPair>& pairs) {
+  std::map<ImageFeature, std::vector<ImageFeature>> edges;
   for (const VerifiedPair& pair : pairs)
     for (std::size_t m = 0; m < pair.feature_a.size(); ++m) {
-      const Sighting a{pair.a.value, pair.feature_a[m]}, b{pair.b.value, pair.feature_b[m]};
+      const ImageFeature a{pair.a.value, pair.feature_a[m]}, b{pair.b.value, pair.feature_b[m]};
       edges[a].push_back(b);
       edges[b].push_back(a);
     }
-  SightingSets components;
-  std::set<Sighting> done;
+  FeatureSets components;
+  std::set<ImageFeature> done;
   for (const auto& [start, ignored] : edges) {
     if (!done.insert(start).second) continue;
-    std::vector<Sighting> component{start};
+    std::vector<ImageFeature> component{start};
     for (std::size_t i = 0; i < component.size(); ++i)
-      for (const Sighting& next : edges[component[i]])
+      for (const ImageFeature& next : edges[component[i]])
         if (done.insert(next).second) component.push_back(next);
     std::sort(component.begin(), component.end());
     components.insert(component);
@@ -81,11 +81,11 @@ SightingSets components_of(const std::vector<VerifiedPair>& pairs) {
   return components;
 }
 
-SightingSets tracks_of(const std::vector<VerifiedPair>& pairs) {
+FeatureSets tracks_of(const std::vector<VerifiedPair>& pairs) {
   const TrackSet set = build_tracks(keypoints(), pairs, {});
-  SightingSets tracks;
+  FeatureSets tracks;
   for (std::size_t t = 0; t < set.id.size(); ++t) {
-    std::vector<Sighting> track;
+    std::vector<ImageFeature> track;
     for (std::int64_t o = set.begin[t]; o < set.begin[t + 1]; ++o)
       track.emplace_back(set.image[static_cast<std::size_t>(o)].value, set.feature[static_cast<std::size_t>(o)]);
     tracks.insert(track);
@@ -96,7 +96,7 @@ SightingSets tracks_of(const std::vector<VerifiedPair>& pairs) {
 TEST(KnownPositionsTracks, TKP11IncompletePairListsGiveTheConnectedComponents) {
   std::mt19937_64 random(11);
   std::vector<VerifiedPair> pairs = incomplete_pairs(random);
-  const SightingSets expected = components_of(pairs);
+  const FeatureSets expected = components_of(pairs);
   EXPECT_EQ(tracks_of(pairs), expected);
   std::shuffle(pairs.begin(), pairs.end(), random);
   EXPECT_EQ(tracks_of(pairs), expected);
@@ -108,9 +108,9 @@ TEST(KnownPositionsTracks, TKP11FalseMergesDoNotPutAnImageTwiceIntoATrack) {
   for (VerifiedPair& pair : pairs)
     for (std::int32_t& feature : pair.feature_b)
       if (random() % 50 == 0) feature = static_cast<std::int32_t>(random() % kFeatures);
-  const SightingSets tracks = tracks_of(pairs);
+  const FeatureSets tracks = tracks_of(pairs);
   EXPECT_GT(tracks.size(), 300u);
-  for (const std::vector<Sighting>& track : tracks)
+  for (const std::vector<ImageFeature>& track : tracks)
     for (std::size_t i = 1; i < track.size(); ++i) ASSERT_LT(track[i - 1].first, track[i].first);
   std::shuffle(pairs.begin(), pairs.end(), random);
   EXPECT_EQ(tracks_of(pairs), tracks);

@@ -233,14 +233,14 @@ TEST(Spec, AT35SameResectionsForAnyNumberOfThreads) {
   constexpr std::size_t kPictures = 64;
   std::mt19937_64 random(36);
   std::uniform_real_distribution<double> uniform(-1, 1);
-  std::vector<std::vector<RaySight>> images(kPictures);
-  for (auto& sights : images)
+  std::vector<std::vector<PointRay>> images(kPictures);
+  for (auto& rays : images)
     for (int i = 0; i < 80; ++i) {
       const double x = uniform(random), y = uniform(random), depth = 4 + 2 * uniform(random);
       const Eigen::Vector3d inside = depth * Eigen::Vector3d(x, y, 1);
       const double u = uniform(random), v = uniform(random);
       const Eigen::Vector3d seen = i % 2 == 0 ? Eigen::Vector3d(u, v, 1) : inside;
-      sights.push_back({Eigen::Vector3d::Zero(), seen.normalized(), inside + Eigen::Vector3d(10, 20, 30)});
+      rays.push_back({Eigen::Vector3d::Zero(), seen.normalized(), inside + Eigen::Vector3d(10, 20, 30)});
     }
   expect_same_on_any_threads(kPictures, [&](std::size_t i) {
     const auto found = ransac(ResectionEstimator(images[i]), {.threshold = 1e-3, .seed = i});

@@ -19,9 +19,9 @@ namespace {
 using RowMatrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 // v - (X - C - offset) / |X - C - offset|, over sigma; blocks C and X.
-class SightResidual : public ceres::SizedCostFunction<3, 3, 3> {
+class DirectionResidual : public ceres::SizedCostFunction<3, 3, 3> {
  public:
-  SightResidual(const Eigen::Vector3d& ray, const Eigen::Vector3d& offset, double inverse_sigma)
+  DirectionResidual(const Eigen::Vector3d& ray, const Eigen::Vector3d& offset, double inverse_sigma)
       : ray_(ray), offset_(offset), inverse_sigma_(inverse_sigma) {}
 
   bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
@@ -81,8 +81,8 @@ void position_globally(const OrientationGraph& graph, const std::vector<Eigen::V
       auto& frame = values.frames[static_cast<std::size_t>(image.frame)];
       const Pose camera = camera_pose(*frame, image.mount);
       // Rotations are held, so that the arm of a camera is a constant in ground axes.
-      problem.AddResidualBlock(new SightResidual(camera.rotation.conjugate() * rays[o], camera.centre - frame->centre,
-                                                 1 / options.ray_sigma_rad),
+      problem.AddResidualBlock(new DirectionResidual(camera.rotation.conjugate() * rays[o],
+                                                     camera.centre - frame->centre, 1 / options.ray_sigma_rad),
                                &ray_loss, frame->centre.data(), point);
     }
     ordering->AddElementToGroup(point, 0);

@@ -11,17 +11,17 @@ namespace megablock {
 
 namespace {
 
-std::vector<RaySight> sights_of(const OrientationGraph& graph, const std::vector<Eigen::Vector3d>& rays,
-                                std::int32_t frame, const OrientationValues& values) {
-  std::vector<RaySight> sights;
+std::vector<PointRay> point_rays_of(const OrientationGraph& graph, const std::vector<Eigen::Vector3d>& rays,
+                                    std::int32_t frame, const OrientationValues& values) {
+  std::vector<PointRay> point_rays;
   for (std::size_t t = 0; t < values.points.size(); ++t)
     for (auto o = static_cast<std::size_t>(graph.begin[t]);
          values.points[t] && o < static_cast<std::size_t>(graph.begin[t + 1]); ++o) {
       const OrientationGraph::ImageNode& image = graph.images[row(graph.observations[o].image)];
       if (image.frame == frame && rays[o].squaredNorm() > 0)
-        sights.push_back({image.mount.centre, image.mount.rotation.conjugate() * rays[o], *values.points[t]});
+        point_rays.push_back({image.mount.centre, image.mount.rotation.conjugate() * rays[o], *values.points[t]});
     }
-  return sights;
+  return point_rays;
 }
 
 }  // namespace
@@ -29,10 +29,10 @@ std::vector<RaySight> sights_of(const OrientationGraph& graph, const std::vector
 std::optional<Pose> resect_frame(const OrientationGraph& graph, const std::vector<Eigen::Vector3d>& rays,
                                  std::int32_t frame, double max_error_rad, int min_points,
                                  const OrientationValues& values) {
-  const std::vector<RaySight> sights = sights_of(graph, rays, frame, values);
+  const std::vector<PointRay> point_rays = point_rays_of(graph, rays, frame, values);
   // A sample of three has several poses; a fourth point decides between them.
-  if (static_cast<int>(sights.size()) < std::max(min_points, 4)) return std::nullopt;
-  const ResectionEstimator estimator(sights);
+  if (static_cast<int>(point_rays.size()) < std::max(min_points, 4)) return std::nullopt;
+  const ResectionEstimator estimator(point_rays);
   RansacOptions sampling;
   sampling.threshold = max_error_rad;
   sampling.confidence = 0.999;
@@ -42,7 +42,7 @@ std::optional<Pose> resect_frame(const OrientationGraph& graph, const std::vecto
   if (!found) return std::nullopt;
   const Pose pose = estimator.adjusted(found->model, max_error_rad, 10);
   const int agreeing = consensus_of(estimator, pose, max_error_rad).count;
-  if (agreeing < min_points || 4 * agreeing < static_cast<int>(sights.size())) return std::nullopt;
+  if (agreeing < min_points || 4 * agreeing < static_cast<int>(point_rays.size())) return std::nullopt;
   return pose;
 }
 

@@ -13,13 +13,13 @@ namespace {
 // Simulates a control point with the stated sigma `control_sigma_m`, and its measurements, both with noise. The role is
 // kControl.
 ControlPoint measure_control(const SimulationOptions& options, const Eigen::Vector3d& truth,
-                             const std::vector<Sighting>& seen, Random& random) {
+                             const std::vector<SimulatedObservation>& seen, Random& random) {
   ControlPoint point;
   point.position = truth + options.control_sigma_m * random.normal3();
   point.sigma.setConstant(options.control_sigma_m);
   // A stated sigma must be positive, also if there is no noise.
   const double sigma_px = options.image_noise_px > 0 ? options.image_noise_px : 0.1;
-  for (const Sighting& s : seen) {
+  for (const SimulatedObservation& s : seen) {
     const double x = random.normal(), y = random.normal();
     point.measurements.push_back({s.image, s.pixel + options.image_noise_px * Eigen::Vector2d(x, y), sigma_px});
   }
@@ -51,13 +51,13 @@ void simulate_control(const SimulationOptions& options, const Observer& observer
     const auto nearest = std::min_element(layout.truth.frames.begin(), layout.truth.frames.end(),
                                           [&](const Pose& a, const Pose& b) { return distance(a) < distance(b); });
     Eigen::Vector3d truth = Eigen::Vector3d::Zero();
-    std::vector<Sighting> seen;
+    std::vector<SimulatedObservation> seen;
     // Three images are wanted. Two images of the last try are accepted.
     for (int tries = 0; tries < 1000 && seen.size() < 3; ++tries) {
       const auto surface = layout.scene->sample(*nearest, random);
       if (!surface) continue;
       truth = surface->position;
-      seen = observer.sightings(*surface);
+      seen = observer.observations_of(*surface);
     }
     if (seen.size() < 2) continue;
     const bool is_control =
@@ -128,9 +128,9 @@ void simulate_control_zones(const SimulationOptions& options, const Observer& ob
       if (std::find(taken.begin(), taken.end(), place) != taken.end()) continue;
       const auto surface = layout.scene->road(place);
       if (!surface) continue;
-      std::vector<Sighting> seen = observer.sightings(*surface);
+      std::vector<SimulatedObservation> seen = observer.observations_of(*surface);
       while (seen.size() > kMeasurements) seen.erase(seen.begin() + random.below(std::ssize(seen)));
-      // The sightings ascend by image. First and last in one frame means that all are, and the rig alone is a short
+      // The observations ascend by image. First and last in one frame means that all are, and the rig alone is a short
       // base.
       if (seen.size() < 3 ||
           layout.block.images[seen.front().image].frame == layout.block.images[seen.back().image].frame)

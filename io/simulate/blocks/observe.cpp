@@ -56,7 +56,7 @@ Observer::Observer(const Layout& layout, double margin_px) : layout_(layout), ma
   }
 }
 
-void Observer::look(std::int64_t frame, const SurfacePoint& point, std::vector<Sighting>& seen) const {
+void Observer::look(std::int64_t frame, const SurfacePoint& point, std::vector<SimulatedObservation>& seen) const {
   const Pose& pose = layout_.truth.frames[FrameIndex(frame)];
   if ((pose.centre - point.position).head<2>().norm() > layout_.scene->range_m()) return;
   // All cameras of the rig are tested from its origin: their lever arms are small against the surfaces.
@@ -99,8 +99,8 @@ Eigen::Vector2d Observer::rolling_pixel(ImageIndex image, const Eigen::Vector3d&
                       place);
 }
 
-std::vector<Sighting> Observer::sightings(const SurfacePoint& point) const {
-  std::vector<Sighting> seen;
+std::vector<SimulatedObservation> Observer::observations_of(const SurfacePoint& point) const {
+  std::vector<SimulatedObservation> seen;
   // A frame within the range lies in the cell of the point or in one of its eight neighbours, because a cell is as
   // large as the range.
   const Eigen::Vector2d place = (point.position.head<2>() - origin_) / cell_m_;
@@ -112,7 +112,8 @@ std::vector<Sighting> Observer::sightings(const SurfacePoint& point) const {
       for (std::int64_t k = cell_begin_[cell]; k < cell_begin_[cell + 1]; ++k)
         look(cell_frames_[static_cast<std::size_t>(k)], point, seen);
     }
-  std::sort(seen.begin(), seen.end(), [](const Sighting& a, const Sighting& b) { return a.image < b.image; });
+  std::sort(seen.begin(), seen.end(),
+            [](const SimulatedObservation& a, const SimulatedObservation& b) { return a.image < b.image; });
   return seen;
 }
 

@@ -12,7 +12,7 @@ namespace megablock {
 // sigmas, and two pixels beside them.
 inline double image_margin(const SimulationOptions& options) { return 2 + 5 * options.image_noise_px; }
 
-struct Sighting {
+struct SimulatedObservation {
   ImageIndex image;
   Eigen::Vector2d pixel;  // without noise
 };
@@ -22,7 +22,7 @@ class Observer {
   // A place counts as seen only if it is at least `margin_px` inside the image.
   Observer(const Layout& layout, double margin_px);
   // The images that see a point, ascending.
-  std::vector<Sighting> sightings(const SurfacePoint& point) const;
+  std::vector<SimulatedObservation> observations_of(const SurfacePoint& point) const;
   // The pixel of a place in an image, even if something hides it. Empty if it is outside the image. A camera with a
   // rolling shutter sees the place from where it is when it reads that row.
   std::optional<Eigen::Vector2d> pixel_of(ImageIndex image, const Eigen::Vector3d& place) const;
@@ -34,7 +34,7 @@ class Observer {
     std::int64_t camera = 0;
   };
   Eigen::Vector2d rolling_pixel(ImageIndex image, const Eigen::Vector3d& place) const;
-  void look(std::int64_t frame, const SurfacePoint& point, std::vector<Sighting>& seen) const;
+  void look(std::int64_t frame, const SurfacePoint& point, std::vector<SimulatedObservation>& seen) const;
 
   const Layout& layout_;
   double margin_px_;

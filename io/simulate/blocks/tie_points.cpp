@@ -31,8 +31,8 @@ constexpr double kEnough = 0.97;
 // A point that a frame seeds.
 struct Proposal {
   SurfacePoint point;
-  int wanted = 0;                   // number of observations
-  std::vector<Sighting> sightings;  // candidates for observations, by preference; later the observations, by image
+  int wanted = 0;                                  // number of observations
+  std::vector<SimulatedObservation> observations;  // candidates by preference, later the chosen ones by image
 };
 
 class TrackMaker {
@@ -67,7 +67,9 @@ class TrackMaker {
  private:
   std::int64_t& count_of(FrameIndex frame) { return count_[static_cast<std::size_t>(frame.value)]; }
   std::int64_t count_of(FrameIndex frame) const { return count_[static_cast<std::size_t>(frame.value)]; }
-  FrameIndex frame_of(const Sighting& sighting) const { return layout_.block.images[sighting.image].frame; }
+  FrameIndex frame_of(const SimulatedObservation& observation) const {
+    return layout_.block.images[observation.image].frame;
+  }
   Random stream_of(FrameIndex frame, int round) const {
     return {options_.seed, Random::Purpose::kTracks, static_cast<std::uint64_t>(2 * frame.value + round)};
   }
@@ -116,9 +118,9 @@ class TrackMaker {
          ++tries) {
       auto proposal = propose(frame, random);
       if (!proposal) continue;
-      const auto length = std::min<std::ptrdiff_t>(proposal->wanted, std::ssize(proposal->sightings));
-      observations += std::count_if(proposal->sightings.begin(), proposal->sightings.begin() + length,
-                                    [&](const Sighting& s) { return frame_of(s) == frame; });
+      const auto length = std::min<std::ptrdiff_t>(proposal->wanted, std::ssize(proposal->observations));
+      observations += std::count_if(proposal->observations.begin(), proposal->observations.begin() + length,
+                                    [&](const SimulatedObservation& s) { return frame_of(s) == frame; });
       added.push_back(*std::move(proposal));
     }
     return added;
@@ -128,9 +130,9 @@ class TrackMaker {
   std::optional<Proposal> propose(FrameIndex frame, Random& random) const {
     const auto point = layout_.scene->sample(layout_.truth.frames[frame], random);
     if (!point) return std::nullopt;
-    std::vector<Sighting> seen = observer_.sightings(*point);
+    std::vector<SimulatedObservation> seen = observer_.observations_of(*point);
     const auto in_frame =
-        std::count_if(seen.begin(), seen.end(), [&](const Sighting& s) { return frame_of(s) == frame; });
+        std::count_if(seen.begin(), seen.end(), [&](const SimulatedObservation& s) { return frame_of(s) == frame; });
     if (in_frame == 0 || in_frame == std::ssize(seen)) return std::nullopt;
     // Two plus Poisson: the mean is mean_track, and no track is shorter than two.
     const int wanted = 2 + random.poisson(options_.mean_track - 2);
@@ -138,20 +140,20 @@ class TrackMaker {
   }
 
   // Selects `count` candidates: the seeding frame first, then the images with the highest preference.
-  std::vector<Sighting> first_choice(FrameIndex frame, const std::vector<Sighting>& seen, std::ptrdiff_t count,
-                                     Random& random) const {
+  std::vector<SimulatedObservation> first_choice(FrameIndex frame, const std::vector<SimulatedObservation>& seen,
+                                                 std::ptrdiff_t count, Random& random) const {
     // Three tracks in ten may join two visits. Such tracks tie the drives to each other; without them each drive would
     // be a block of its own.
     const bool two_passes = layout_.scene->along_passes() && random.uniform() < 0.3;
     const std::int64_t pass = layout_.block.frames[frame].pass;
     struct Candidate {
       double rank;
-      Sighting sighting;
+      SimulatedObservation observation;
     };
     std::vector<Candidate> candidates;
     candidates.reserve(seen.size());
     bool owned = false;
-    for (const Sighting& s : seen) {
+    for (const SimulatedObservation& s : seen) {
       const FrameIndex other = frame_of(s);
       // Aerial: the fraction decides, frames that have enough come last. Streets: the distance in frames decides, the
       // fraction only among the cameras of a frame.
@@ -173,15 +175,15 @@ class TrackMaker {
       candidates.push_back({rank, s});
     }
     std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-      return a.rank != b.rank ? a.rank < b.rank : a.sighting.image < b.sighting.image;
+      return a.rank != b.rank ? a.rank < b.rank : a.observation.image < b.observation.image;
     });
     // The second candidate must belong to another frame: two cameras of one frame are not enough for a track.
     const auto partner = std::find_if(candidates.begin() + 1, candidates.end(),
-                                      [&](const Candidate& c) { return frame_of(c.sighting) != frame; });
+                                      [&](const Candidate& c) { return frame_of(c.observation) != frame; });
     std::rotate(candidates.begin() + 1, partner, partner + 1);
     candidates.resize(static_cast<std::size_t>(std::min(count, std::ssize(candidates))));
-    std::vector<Sighting> chosen;
-    for (const Candidate& candidate : candidates) chosen.push_back(candidate.sighting);
+    std::vector<SimulatedObservation> chosen;
+    for (const Candidate& candidate : candidates) chosen.push_back(candidate.observation);
     return chosen;
   }
 
@@ -189,11 +191,12 @@ class TrackMaker {
   // later tracks.
   void accept(Proposal& proposal) {
     const int length = proposal.wanted + std::min(kMostExtra, lacking_);
-    std::vector<Sighting>& seen = proposal.sightings;
+    std::vector<SimulatedObservation>& seen = proposal.observations;
     seen.resize(std::min(seen.size(), static_cast<std::size_t>(length)));
     lacking_ += proposal.wanted - static_cast<int>(seen.size());
-    std::sort(seen.begin(), seen.end(), [](const Sighting& a, const Sighting& b) { return a.image < b.image; });
-    for (const Sighting& s : seen) ++count_of(frame_of(s));
+    std::sort(seen.begin(), seen.end(),
+              [](const SimulatedObservation& a, const SimulatedObservation& b) { return a.image < b.image; });
+    for (const SimulatedObservation& s : seen) ++count_of(frame_of(s));
   }
 
   SimulatedTracks measured(const std::vector<Proposal>& proposals, std::int64_t track) const {
@@ -210,7 +213,7 @@ class TrackMaker {
   }
 
   void measure(const Proposal& proposal, Random& random, SimulatedTracks& result) const {
-    const std::vector<Sighting>& seen = proposal.sightings;
+    const std::vector<SimulatedObservation>& seen = proposal.observations;
     const WrongGroup wrong = draw_wrong_group(options_, layout_, observer_, proposal.point, seen, random);
     for (std::size_t i = 0; i < seen.size(); ++i) {
       const Camera& camera = layout_.block.cameras[layout_.block.camera_of(seen[i].image)];
@@ -218,8 +221,8 @@ class TrackMaker {
       const bool stray = agreed ? !wrong.pixels[i - wrong.begin] : random.uniform() < wrong.stray_share;
       const Eigen::Vector2d place = agreed && !stray ? *wrong.pixels[i - wrong.begin] : seen[i].pixel;
       Eigen::Vector2d pixel;
-      // An observation outside the image is drawn again. The margin of the sightings (image_margin()) makes this rare,
-      // so that the noise keeps its distribution.
+      // An observation outside the image is drawn again. The margin of the observations (image_margin()) makes this
+      // rare, so that the noise keeps its distribution.
       do {
         const double a = stray ? random.uniform() : random.normal(), b = stray ? random.uniform() : random.normal();
         pixel = stray ? Eigen::Vector2d(a * camera.width, b * camera.height)

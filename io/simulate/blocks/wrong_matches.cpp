@@ -8,7 +8,7 @@ namespace megablock {
 // Of n observations a group has m, with m uniform in 1 .. n/2 and the mean (1 + n/2) / 2. A group is drawn with the
 // probability p = group_share n / mean, so that the expected number of outliers is group_share n.
 WrongGroup draw_wrong_group(const SimulationOptions& options, const Layout& layout, const Observer& observer,
-                            const SurfacePoint& point, const std::vector<Sighting>& seen, Random& random) {
+                            const SurfacePoint& point, const std::vector<SimulatedObservation>& seen, Random& random) {
   WrongGroup group;
   group.stray_share = options.outlier_share;
   if (options.outlier_share == 0) return group;
@@ -26,11 +26,11 @@ WrongGroup draw_wrong_group(const SimulationOptions& options, const Layout& layo
   if (!drawn) return group;
   group.begin = static_cast<std::size_t>(begin);
   group.verdict = mistake->verdict;
-  const auto time_of = [&](const Sighting& s) {
+  const auto time_of = [&](const SimulatedObservation& s) {
     return layout.block.frames[layout.block.images[s.image].frame].time_s;
   };
   for (std::int64_t i = begin; i < begin + length; ++i) {
-    const Sighting& s = seen[static_cast<std::size_t>(i)];
+    const SimulatedObservation& s = seen[static_cast<std::size_t>(i)];
     const double elapsed = time_of(s) - time_of(seen[group.begin]);
     // Half a second of the way lies between the point and the vehicle in the first observation, so that this one is
     // wrong too. After ten seconds a vehicle is out of sight; the observation is then an outlier anywhere.

@@ -17,6 +17,6 @@ struct WrongGroup {
 
 // If the scene has mistakes, groups get two thirds of outlier_share, and outliers at random places the rest.
 WrongGroup draw_wrong_group(const SimulationOptions& options, const Layout& layout, const Observer& observer,
-                            const SurfacePoint& point, const std::vector<Sighting>& seen, Random& random);
+                            const SurfacePoint& point, const std::vector<SimulatedObservation>& seen, Random& random);
 
 }  // namespace megablock

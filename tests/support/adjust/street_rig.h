@@ -27,22 +27,22 @@ struct StreetRig {
   }
 
   // Pixel of a point in rig coordinates, by the first camera that sees it.
-  struct Sighting {
+  struct CameraPixel {
     std::size_t camera;
     Eigen::Vector2d pixel;
   };
-  std::optional<Sighting> see(const Eigen::Vector3d& in_rig) const {
+  std::optional<CameraPixel> see(const Eigen::Vector3d& in_rig) const {
     for (std::size_t c = 0; c < mounts.size(); ++c) {
       const Eigen::Vector3d p = to_inside(mounts[c], in_rig);
       if (!(p.z() > 0.5)) continue;
       const Eigen::Vector2d pixel = project(intrinsics, p);
-      if (pixel.x() > 0 && pixel.x() < 1920 && pixel.y() > 0 && pixel.y() < 1080) return Sighting{c, pixel};
+      if (pixel.x() > 0 && pixel.x() < 1920 && pixel.y() > 0 && pixel.y() < 1080) return CameraPixel{c, pixel};
     }
     return std::nullopt;
   }
-  // The ray of a sighting with noise.
-  RigRay ray(const Sighting& sighting, const Eigen::Vector2d& noise) const {
-    return *rig_ray(mounts[sighting.camera], intrinsics, sighting.pixel + noise);
+  // The ray of a pixel_in_camera with noise.
+  RigRay ray(const CameraPixel& pixel_in_camera, const Eigen::Vector2d& noise) const {
+    return *rig_ray(mounts[pixel_in_camera.camera], intrinsics, pixel_in_camera.pixel + noise);
   }
 };
 

@@ -51,39 +51,39 @@ Averaged chain(std::int32_t nodes, std::uint64_t seed) {
 
 const Eigen::Vector3d kDown = -Eigen::Vector3d::UnitZ();
 
-SeenDown sight(std::int32_t node, const Eigen::Vector3d& direction, double sigma_deg) {
+SeenDown seen_down(std::int32_t node, const Eigen::Vector3d& direction, double sigma_deg) {
   return {node, 0, direction.normalized(), std::pow(sigma_deg * kDegree, 2) * Eigen::Matrix3d::Identity(),
           Eigen::Matrix3Xd(3, 0)};
 }
 
 // Of every node, with errors of this sigma; some see down anywhere.
-struct Sights {
+struct SeenVerticals {
   std::vector<SeenDown> seen;
   std::vector<std::uint8_t> wrong;
 };
-Sights sights_of(const Averaged& block, double sigma_deg, double wrong, std::uint64_t seed) {
-  Sights sights;
+SeenVerticals verticals_of(const Averaged& block, double sigma_deg, double wrong, std::uint64_t seed) {
+  SeenVerticals verticals;
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> uniform(0, 1);
   for (std::size_t i = 0; i < block.truth.size(); ++i) {
     Eigen::Vector3d seen = rotation_exp<double>(sigma_deg * kDegree * normal_vector(random)) * (block.truth[i] * kDown);
     const bool is_wrong = uniform(random) < wrong;
     if (is_wrong) seen = normal_vector(random);
-    sights.seen.push_back(sight(static_cast<std::int32_t>(i), seen, sigma_deg));
-    sights.wrong.push_back(is_wrong);
+    verticals.seen.push_back(seen_down(static_cast<std::int32_t>(i), seen, sigma_deg));
+    verticals.wrong.push_back(is_wrong);
   }
-  return sights;
+  return verticals;
 }
 
 struct Believed {
   std::int64_t right = 0, right_believed = 0, wrong = 0, wrong_believed = 0;
 };
-Believed believed(const Sights& sights, const std::vector<VerticalVerdict>& verdicts) {
+Believed believed(const SeenVerticals& verticals, const std::vector<VerticalVerdict>& verdicts) {
   Believed counts;
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     const bool yes = verdicts[i] == VerticalVerdict::kBelieved;
-    (sights.wrong[i] ? counts.wrong : counts.right) += 1;
-    (sights.wrong[i] ? counts.wrong_believed : counts.right_believed) += yes;
+    (verticals.wrong[i] ? counts.wrong : counts.right) += 1;
+    (verticals.wrong[i] ? counts.wrong_believed : counts.right_believed) += yes;
   }
   return counts;
 }
@@ -98,8 +98,8 @@ TEST(VerticalCheck, RightOnesAreBelieved) {
     std::int64_t rejected = 0, all = 0;
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
       const Averaged block = chain(300, seed);
-      const Sights sights = sights_of(block, sigma_deg, 0, seed + 100);
-      const Believed counts = believed(sights, block.judge(sights.seen));
+      const SeenVerticals verticals = verticals_of(block, sigma_deg, 0, seed + 100);
+      const Believed counts = believed(verticals, block.judge(verticals.seen));
       rejected += counts.right - counts.right_believed;
       all += counts.right;
     }
@@ -114,9 +114,9 @@ TEST(VerticalCheck, HalfOfThemWrong) {
   Believed sum;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const Averaged block = chain(200, seed);
-    const Sights sights = sights_of(block, 0.1, 0.5, seed + 200);
-    const auto verdicts = block.judge(sights.seen);
-    const Believed counts = believed(sights, verdicts);
+    const SeenVerticals verticals = verticals_of(block, 0.1, 0.5, seed + 200);
+    const auto verdicts = block.judge(verticals.seen);
+    const Believed counts = believed(verticals, verdicts);
     sum.right += counts.right, sum.right_believed += counts.right_believed;
     sum.wrong += counts.wrong, sum.wrong_believed += counts.wrong_believed;
     EXPECT_EQ(std::count(verdicts.begin(), verdicts.end(), VerticalVerdict::kNoConsensus), 0);
@@ -131,7 +131,7 @@ TEST(VerticalCheck, HalfOfThemWrong) {
 TEST(VerticalCheck, AllOfThemWrong) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const Averaged block = chain(60, seed);
-    expect_all(block.judge(sights_of(block, 0.1, 1, seed).seen), VerticalVerdict::kNoConsensus);
+    expect_all(block.judge(verticals_of(block, 0.1, 1, seed).seen), VerticalVerdict::kNoConsensus);
   }
 }
 
@@ -146,8 +146,8 @@ TEST(VerticalCheck, RowsOfAField) {
   for (std::int32_t i = 0; i < kStrips * kLength; ++i) {
     block.truth.push_back(rotation_exp<double>(normal_vector(random)));
     const double sign = (i / kLength) % 2 == 0 ? 1 : -1;
-    to_and_fro.push_back(sight(i, block.truth.back() * (sign * row_of_field), 0.1));
-    one_way.push_back(sight(i, block.truth.back() * row_of_field, 0.1));
+    to_and_fro.push_back(seen_down(i, block.truth.back() * (sign * row_of_field), 0.1));
+    one_way.push_back(seen_down(i, block.truth.back() * row_of_field, 0.1));
   }
   for (std::int32_t i = 0; i < kStrips * kLength; ++i)
     for (const std::int32_t next : {1, 2, kLength})
@@ -174,7 +174,7 @@ TEST(VerticalCheck, ErrorsOfTheCameraAreNoContradiction) {
   for (std::int32_t i = 0; i < 100; ++i) {
     const Eigen::Vector3d down = block.truth[static_cast<std::size_t>(i)] * kDown;
     const Eigen::Vector3d across = Eigen::Vector3d::UnitX().cross(down);
-    known.push_back(sight(i, down + 0.15 * across, 0.1));
+    known.push_back(seen_down(i, down + 0.15 * across, 0.1));
     unknown.push_back(known.back());
     unknown.back().by_camera = 0.15 * across;
   }
@@ -190,8 +190,8 @@ TEST(VerticalCheck, FramesWithSeveralImages) {
   std::vector<SeenDown> seen;
   for (std::int32_t i = 0; i < 40; ++i)
     for (int image = 0; image < 10; ++image)
-      seen.push_back(
-          sight(i, block.truth[static_cast<std::size_t>(i)] * (image == 9 ? Eigen::Vector3d::UnitX() : kDown), 0.1));
+      seen.push_back(seen_down(
+          i, block.truth[static_cast<std::size_t>(i)] * (image == 9 ? Eigen::Vector3d::UnitX() : kDown), 0.1));
   const auto verdicts = block.judge(seen);
   for (std::size_t s = 0; s < seen.size(); ++s)
     EXPECT_EQ(verdicts[s], s % 10 == 9 ? VerticalVerdict::kContradicted : VerticalVerdict::kBelieved) << s;
@@ -201,7 +201,7 @@ TEST(VerticalCheck, Few) {
   const Averaged block = chain(10, 6);
   EXPECT_TRUE(block.judge({}).empty());
   const auto seen = [&](std::int32_t node, const Eigen::Vector3d& ground) {
-    return sight(node, block.truth[static_cast<std::size_t>(node)] * ground, 0.1);
+    return seen_down(node, block.truth[static_cast<std::size_t>(node)] * ground, 0.1);
   };
   expect_all(block.judge({seen(3, kDown)}), VerticalVerdict::kBelieved);
   expect_all(block.judge({seen(3, kDown), seen(7, kDown)}), VerticalVerdict::kBelieved);
@@ -214,16 +214,16 @@ TEST(VerticalCheck, Few) {
   loose.truth.insert(loose.truth.end(), 2, Eigen::Quaterniond::Identity());
   loose.found.rotation.push_back(std::nullopt);
   loose.found.rotation.push_back(Eigen::Quaterniond::Identity());
-  expect_all(loose.judge({seen(3, kDown), seen(7, kDown), sight(10, kDown, 0.1), sight(11, -kDown, 0.1)}),
+  expect_all(loose.judge({seen(3, kDown), seen(7, kDown), seen_down(10, kDown, 0.1), seen_down(11, -kDown, 0.1)}),
              VerticalVerdict::kBelieved);
-  EXPECT_EQ(loose.judge({seen(3, kDown), seen(7, -kDown), sight(10, kDown, 0.1)}).back(),
+  EXPECT_EQ(loose.judge({seen(3, kDown), seen(7, -kDown), seen_down(10, kDown, 0.1)}).back(),
             VerticalVerdict::kNoConsensus);
 }
 
 TEST(VerticalCheck, IsRepeatable) {
   const Averaged block = chain(200, 7);
-  const Sights sights = sights_of(block, 0.1, 0.5, 8);
-  EXPECT_EQ(block.judge(sights.seen), block.judge(sights.seen));
+  const SeenVerticals verticals = verticals_of(block, 0.1, 0.5, 8);
+  EXPECT_EQ(block.judge(verticals.seen), block.judge(verticals.seen));
 }
 
 Block street_with_verticals() {

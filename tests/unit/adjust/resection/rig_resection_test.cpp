@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "adjust/resection/rig_sights.h"
+#include "adjust/resection/observed_points.h"
 #include "io/base/error.h"
 #include "tests/support/adjust/street_rig.h"
 
@@ -14,20 +14,20 @@ using testing::HasSubstr;
 
 const StreetRig kRig;
 
-std::vector<RigSight> sights_of(const std::vector<Eigen::Vector3d>& points, const Pose& frame, Noise& noise,
-                                double sigma_px = 0.5) {
-  std::vector<RigSight> sights;
+std::vector<ObservedPoint> observations_of(const std::vector<Eigen::Vector3d>& points, const Pose& frame, Noise& noise,
+                                           double sigma_px = 0.5) {
+  std::vector<ObservedPoint> observations;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto seen = kRig.see(to_inside(frame, points[i]));
     if (!seen) continue;
-    RigSight sight;
-    sight.ray = kRig.ray(*seen, sigma_px * noise.pair());
-    sight.point = points[i];
-    sight.sigma_px = sigma_px;
-    sight.id = static_cast<std::int64_t>(i);
-    sights.push_back(sight);
+    ObservedPoint observation;
+    observation.ray = kRig.ray(*seen, sigma_px * noise.pair());
+    observation.point = points[i];
+    observation.sigma_px = sigma_px;
+    observation.id = static_cast<std::int64_t>(i);
+    observations.push_back(observation);
   }
-  return sights;
+  return observations;
 }
 
 // Details on all sides of a narrow crossing.
@@ -40,9 +40,10 @@ std::vector<Eigen::Vector3d> surroundings(Noise& noise, int count) {
   return points;
 }
 
-std::string refusal(const std::vector<RigSight>& sights, const std::optional<ApproximatePose>& approximate = {}) {
+std::string refusal(const std::vector<ObservedPoint>& observations,
+                    const std::optional<ApproximatePose>& approximate = {}) {
   try {
-    resect_rig(sights, {}, 1, approximate);
+    resect_rig(observations, {}, 1, approximate);
   } catch (const ComputeError& error) {
     return error.what();
   }
@@ -58,8 +59,8 @@ TEST(RigResection, TripletsOfSeventeenPoints) {
     const Pose truth = level_rig({500, 300, 32.5}, 0.7, {0.01, -0.02, 0.005});
     std::vector<Eigen::Vector3d> points = surroundings(noise, 9);
     for (int i = 0; i < 8; ++i) points.emplace_back(509, 296.5 + i, 30.0);
-    const std::vector<RigSight> sights = sights_of(points, truth, noise);
-    if (sights.size() < 17) continue;  // above or below the images
+    const std::vector<ObservedPoint> observations = observations_of(points, truth, noise);
+    if (observations.size() < 17) continue;  // above or below the images
     ++sites;
     ApproximatePose approximate{truth, 2, 0.001};  // a masked trajectory: metres, 0.06 degrees
     approximate.pose.centre += Eigen::Vector3d(1.6, -1.8, 0.3);
@@ -70,7 +71,8 @@ TEST(RigResection, TripletsOfSeventeenPoints) {
           const bool on_one_line = i >= 9;
           aligned += on_one_line;
           try {
-            const RigResection result = resect_rig(std::vector{sights[i], sights[j], sights[k]}, {}, 1, approximate);
+            const RigResection result =
+                resect_rig(std::vector{observations[i], observations[j], observations[k]}, {}, 1, approximate);
             const double error = (result.pose.centre - truth.centre).norm();
             within_5cm += error <= 0.05, within_1cm += error <= 0.01;
           } catch (const ComputeError& error) {
@@ -99,14 +101,14 @@ TEST(RigResection, WrongPointsAreFoundAndTheSigmaIsTrue) {
   for (int trial = 0; trial < kTrials; ++trial) {
     const Pose truth = level_rig({500, 300, 32.5}, noise.uniform(-3, 3));
     std::vector<Eigen::Vector3d> points = surroundings(noise, 32);
-    std::vector<RigSight> sights = sights_of(points, truth, noise);
-    for (RigSight& sight : sights) {  // stated positions with an error of their own
-      sight.point += 0.02 * noise.triple();
-      sight.covariance = 0.02 * 0.02 * Eigen::Matrix3d::Identity();
+    std::vector<ObservedPoint> observations = observations_of(points, truth, noise);
+    for (ObservedPoint& observation : observations) {  // stated positions with an error of their own
+      observation.point += 0.02 * noise.triple();
+      observation.covariance = 0.02 * 0.02 * Eigen::Matrix3d::Identity();
     }
-    for (std::size_t i = 0; i < 8; ++i) sights[i].point += 3 * noise.triple();
-    const RigResection result = resect_rig(sights, {}, static_cast<std::uint64_t>(trial));
-    EXPECT_GE(result.points, static_cast<int>(sights.size()) - 10);
+    for (std::size_t i = 0; i < 8; ++i) observations[i].point += 3 * noise.triple();
+    const RigResection result = resect_rig(observations, {}, static_cast<std::uint64_t>(trial));
+    EXPECT_GE(result.points, static_cast<int>(observations.size()) - 10);
     const Eigen::Vector3d error = result.pose.centre - truth.centre;
     normalised += error.dot(result.covariance.bottomRightCorner<3, 3>().inverse() * error) / 3 / kTrials;
   }
@@ -117,11 +119,11 @@ TEST(RigResection, WrongPointsAreFoundAndTheSigmaIsTrue) {
 TEST(RigResection, SaysWhatIsMissing) {
   Noise noise(9);
   const Pose truth = level_rig({500, 300, 32.5}, 0.2);
-  const std::vector<RigSight> sights = sights_of(surroundings(noise, 12), truth, noise);
-  EXPECT_THAT(refusal({sights[0], sights[1]}), HasSubstr("2 known points are seen, at least 3"));
-  EXPECT_THAT(refusal({sights[0], sights[1], sights[1]}), HasSubstr("2 known points"));
-  std::vector<RigSight> moved = sights;
-  for (RigSight& sight : moved) sight.point += 10 * noise.triple();
+  const std::vector<ObservedPoint> observations = observations_of(surroundings(noise, 12), truth, noise);
+  EXPECT_THAT(refusal({observations[0], observations[1]}), HasSubstr("2 known points are seen, at least 3"));
+  EXPECT_THAT(refusal({observations[0], observations[1], observations[1]}), HasSubstr("2 known points"));
+  std::vector<ObservedPoint> moved = observations;
+  for (ObservedPoint& observation : moved) observation.point += 10 * noise.triple();
   EXPECT_THAT(refusal(moved), HasSubstr("points agree with one pose"));
 }
 
@@ -130,13 +132,13 @@ TEST(RigResection, ThreePointsNeedAnApproximatePoseWhereSeveralFit) {
   int ambiguous = 0;
   for (int trial = 0; trial < 60; ++trial) {
     const Pose truth = level_rig({500, 300, 32.5}, 0.2);
-    const std::vector<RigSight> sights = sights_of(surroundings(noise, 3), truth, noise);
-    const std::string text = refusal(sights);
+    const std::vector<ObservedPoint> observations = observations_of(surroundings(noise, 3), truth, noise);
+    const std::string text = refusal(observations);
     if (text.find("equally well") == std::string::npos) continue;
     ++ambiguous;
     RigResectionOptions options;
     options.max_position_sigma_m = 1;
-    EXPECT_LT((resect_rig(sights, options, 1, ApproximatePose{truth}).pose.centre - truth.centre).norm(), 1);
+    EXPECT_LT((resect_rig(observations, options, 1, ApproximatePose{truth}).pose.centre - truth.centre).norm(), 1);
   }
   EXPECT_GT(ambiguous, 5);
 }
@@ -147,7 +149,7 @@ TEST(RigResection, WarnsOfPointsInOneDirection) {
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < 10; ++i)
     points.emplace_back(515 + 3 * noise.uniform(0, 1), 298.5 + noise.uniform(0, 3), 32 + noise.uniform(0, 2));
-  const RigResection result = resect_rig(sights_of(points, truth, noise), {}, 1);
+  const RigResection result = resect_rig(observations_of(points, truth, noise), {}, 1);
   ASSERT_EQ(result.warnings.size(), 1u);
   EXPECT_THAT(result.warnings[0], HasSubstr("less than 20"));
 }

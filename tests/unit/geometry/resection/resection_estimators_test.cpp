@@ -11,14 +11,14 @@
 namespace megablock {
 namespace {
 
-constexpr double kSightLimit = 4e-3;  // radians; the noise is 1e-3
+constexpr double kRayLimit = 4e-3;  // radians; the noise is 1e-3
 
-struct SightScene {
+struct RayScene {
   Pose truth;
-  std::vector<RaySight> sights;
+  std::vector<PointRay> rays;
   // The cameras are within half a metre of the rig's origin, the points 5 to 30 m away, in front of the first camera or
   // all around.
-  SightScene(int cameras, int count, double wrong, std::uint64_t seed) {
+  RayScene(int cameras, int count, double wrong, std::uint64_t seed) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> uniform(-1, 1);
     std::normal_distribution<double> normal(0, 1);
@@ -28,29 +28,29 @@ struct SightScene {
     };
     truth = {rotation_exp<double>(vector()), 50 * vector()};
     for (int i = 0; i < count; ++i) {
-      RaySight sight;
+      PointRay ray;
       if (cameras > 1)
-        sight.origin = Eigen::AngleAxisd(i % cameras, Eigen::Vector3d::UnitY()) * Eigen::Vector3d(0, 0, 0.5);
+        ray.origin = Eigen::AngleAxisd(i % cameras, Eigen::Vector3d::UnitY()) * Eigen::Vector3d(0, 0, 0.5);
       const auto anywhere = [&] {
         const Eigen::Vector3d ahead(0.6 * uniform(random), 0.4 * uniform(random), 1);
         return cameras > 1 ? vector().normalized() : ahead.normalized();
       };
-      sight.direction = anywhere();
-      sight.point = truth.centre +
-                    truth.rotation.conjugate() * (sight.origin + (17.5 + 12.5 * uniform(random)) * sight.direction);
-      if (0.5 * (uniform(random) + 1) < wrong) sight.direction = anywhere();
-      sight.direction = (sight.direction + 1e-3 * vector()).normalized();
-      sights.push_back(sight);
+      ray.direction = anywhere();
+      ray.point =
+          truth.centre + truth.rotation.conjugate() * (ray.origin + (17.5 + 12.5 * uniform(random)) * ray.direction);
+      if (0.5 * (uniform(random) + 1) < wrong) ray.direction = anywhere();
+      ray.direction = (ray.direction + 1e-3 * vector()).normalized();
+      rays.push_back(ray);
     }
   }
 };
 
-TEST(ResectionEstimator, FindsThePoseAmongWrongSights) {
+TEST(ResectionEstimator, FindsThePoseAmongOutliers) {
   for (const int cameras : {1, 6})
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-      const SightScene scene(cameras, 200, 0.6, seed);
-      const ResectionEstimator estimator(scene.sights);
-      const auto found = ransac(estimator, {.threshold = kSightLimit, .max_draws = 500, .seed = seed});
+      const RayScene scene(cameras, 200, 0.6, seed);
+      const ResectionEstimator estimator(scene.rays);
+      const auto found = ransac(estimator, {.threshold = kRayLimit, .max_draws = 500, .seed = seed});
       ASSERT_TRUE(found);
       EXPECT_NEAR(found->consensus.count, 80, 25);
       EXPECT_LT((found->model.centre - scene.truth.centre).norm(), 0.1);
@@ -59,8 +59,8 @@ TEST(ResectionEstimator, FindsThePoseAmongWrongSights) {
 }
 
 TEST(ResectionEstimator, AdjustmentEndsInAMinimum) {
-  const SightScene scene(1, 300, 0, 5);
-  const ResectionEstimator estimator(scene.sights);
+  const RayScene scene(1, 300, 0, 5);
+  const ResectionEstimator estimator(scene.rays);
   Pose start = scene.truth;
   start.centre += Eigen::Vector3d(0.01, -0.01, 0.01);
   const Pose found = estimator.adjusted(start, 1, 20);
@@ -76,25 +76,25 @@ TEST(ResectionEstimator, AdjustmentEndsInAMinimum) {
 }
 
 TEST(ResectionEstimator, BadInput) {
-  const auto count = [](const std::vector<RaySight>& sights) {
-    const auto found = ransac(ResectionEstimator(sights), {.threshold = kSightLimit, .max_draws = 200, .seed = 1});
+  const auto count = [](const std::vector<PointRay>& rays) {
+    const auto found = ransac(ResectionEstimator(rays), {.threshold = kRayLimit, .max_draws = 200, .seed = 1});
     return found ? found->consensus.count : 0;
   };
   EXPECT_EQ(count({}), 0);
-  std::vector<RaySight> two = SightScene(1, 2, 0, 1).sights;
+  std::vector<PointRay> two = RayScene(1, 2, 0, 1).rays;
   EXPECT_EQ(count(two), 0);
-  EXPECT_EQ(count(std::vector<RaySight>(50, two[0])), 0) << "one point, again and again";
-  std::vector<RaySight> line = SightScene(1, 50, 0, 1).sights;
+  EXPECT_EQ(count(std::vector<PointRay>(50, two[0])), 0) << "one point, again and again";
+  std::vector<PointRay> line = RayScene(1, 50, 0, 1).rays;
   for (std::size_t i = 0; i < line.size(); ++i) line[i].point = {1.0 * static_cast<double>(i), 2, 3};
   EXPECT_EQ(count(line), 0) << "points on one line";
 
   // Observations that are not finite, or behind the camera, are never inliers and do no harm.
-  SightScene scene(1, 200, 0, 2);
+  RayScene scene(1, 200, 0, 2);
   for (std::size_t i = 0; i < 40; ++i) {
-    scene.sights[5 * i].point.x() = std::numeric_limits<double>::quiet_NaN();
-    scene.sights[5 * i + 1].direction *= -1;
+    scene.rays[5 * i].point.x() = std::numeric_limits<double>::quiet_NaN();
+    scene.rays[5 * i + 1].direction *= -1;
   }
-  const auto found = ransac(ResectionEstimator(scene.sights), {.threshold = kSightLimit, .max_draws = 500, .seed = 1});
+  const auto found = ransac(ResectionEstimator(scene.rays), {.threshold = kRayLimit, .max_draws = 500, .seed = 1});
   ASSERT_TRUE(found);
   EXPECT_LT((found->model.centre - scene.truth.centre).norm(), 0.1);
   for (std::size_t i = 0; i < 40; ++i) {

@@ -42,12 +42,12 @@ VerifiedPair make_pair(std::int64_t a, std::int64_t b, const std::vector<std::pa
   return pair;
 }
 
-using Sightings = std::vector<std::pair<std::int64_t, std::int32_t>>;  // image, feature
+using TrackImages = std::vector<std::pair<std::int64_t, std::int32_t>>;  // image, feature
 
-std::vector<Sightings> to_lists(const TrackSet& set) {
-  std::vector<Sightings> tracks;
+std::vector<TrackImages> to_lists(const TrackSet& set) {
+  std::vector<TrackImages> tracks;
   for (std::size_t t = 0; t < set.id.size(); ++t) {
-    Sightings track;
+    TrackImages track;
     for (auto i = static_cast<std::size_t>(set.begin[t]); i < static_cast<std::size_t>(set.begin[t + 1]); ++i) {
       track.emplace_back(set.image[i].value, set.feature[i]);
     }
@@ -56,10 +56,10 @@ std::vector<Sightings> to_lists(const TrackSet& set) {
   return tracks;
 }
 
-std::vector<Sightings> to_lists(const TrackBuilder& builder) {
-  std::vector<Sightings> tracks;
+std::vector<TrackImages> to_lists(const TrackBuilder& builder) {
+  std::vector<TrackImages> tracks;
   builder.visit(2, [&](const megablock::Track& found) {
-    Sightings track;
+    TrackImages track;
     for (std::size_t i = 0; i < found.images.size(); ++i) track.emplace_back(found.images[i].value, found.features[i]);
     tracks.push_back(track);
     EXPECT_EQ(builder.track(found.first).images, found.images);
@@ -79,13 +79,13 @@ TEST(Tracks, LaterBatchesDoNotUndoEarlierOnes) {
   builder.build();
   EXPECT_EQ(builder.long_tracks(0), (IndexedVector<ImageIndex, std::int64_t>({1, 1, 1, 0})));
   EXPECT_EQ(builder.long_tracks(1), builder.long_tracks(0)) << "brought no pairs";
-  EXPECT_EQ(to_lists(builder).front(), (Sightings{{0, 0}, {1, 0}, {2, 0}, {3, 0}}));
+  EXPECT_EQ(to_lists(builder).front(), (TrackImages{{0, 0}, {1, 0}, {2, 0}, {3, 0}}));
   EXPECT_EQ(builder.long_tracks(2)[ImageIndex(3)], 1);
   EXPECT_EQ(builder.long_tracks(9), builder.long_tracks(2)) << "the last one that brought pairs";
 }
 
 // Independent of the builder: sets as std::set, pairs sorted as the header says, no feature numbers.
-std::vector<Sightings> tracks_by_brute_force(std::vector<std::pair<int, VerifiedPair>> pairs) {
+std::vector<TrackImages> tracks_by_brute_force(std::vector<std::pair<int, VerifiedPair>> pairs) {
   std::sort(pairs.begin(), pairs.end(), [](const auto& p, const auto& q) {
     return std::tuple(p.first, q.second.feature_a.size(), p.second.a, p.second.b) <
            std::tuple(q.first, p.second.feature_a.size(), q.second.a, q.second.b);
@@ -106,7 +106,7 @@ std::vector<Sightings> tracks_by_brute_force(std::vector<std::pair<int, Verified
       a->insert(b->begin(), b->end());
       sets.erase(b);
     }
-  std::vector<Sightings> tracks;
+  std::vector<TrackImages> tracks;
   for (const auto& set : sets)
     if (set.size() >= 2) tracks.emplace_back(set.begin(), set.end());
   std::sort(tracks.begin(), tracks.end());
@@ -126,7 +126,7 @@ TEST(Tracks, EqualBruteForceHoweverLittleMemorySorts) {
       pairs.emplace_back(b > 9 ? 1 : 0, make_pair(a, b, matches));
     }
   }
-  const std::vector<Sightings> expected = tracks_by_brute_force(pairs);
+  const std::vector<TrackImages> expected = tracks_by_brute_force(pairs);
   ASSERT_GT(expected.size(), 100u);
   const ScratchDirectory directory;
   const std::string scratch = directory.path("matches");
@@ -155,7 +155,7 @@ TEST(Tracks, JoinMatchesOverImages) {
   const Keypoints keypoints = make_keypoints(4, 5);
   const TrackSet set = build_tracks(
       keypoints, {make_pair(2, 3, {{1, 1}}), make_pair(0, 2, {{4, 1}, {0, 0}}), make_pair(0, 1, {{4, 2}})}, {});
-  EXPECT_EQ(to_lists(set), (std::vector<Sightings>{{{0, 0}, {2, 0}}, {{0, 4}, {1, 2}, {2, 1}, {3, 1}}}));
+  EXPECT_EQ(to_lists(set), (std::vector<TrackImages>{{{0, 0}, {2, 0}}, {{0, 4}, {1, 2}, {2, 1}, {3, 1}}}));
   EXPECT_EQ(set.id, (std::vector<TrackIndex>{TrackIndex(0), TrackIndex(1)}));
   EXPECT_EQ(set.x[1], keypoints[ImageIndex(2)][0].x);
   EXPECT_EQ(set.y[1], keypoints[ImageIndex(2)][0].y);
@@ -168,7 +168,7 @@ TEST(Tracks, SplitWhereAnImageWouldBeSeenTwice) {
       keypoints,
       {make_pair(0, 2, {{0, 3}}), make_pair(0, 1, {{0, 0}, {1, 1}, {2, 2}}), make_pair(1, 2, {{0, 0}, {1, 1}})}, {});
   EXPECT_EQ(to_lists(set),
-            (std::vector<Sightings>{{{0, 0}, {1, 0}, {2, 0}}, {{0, 1}, {1, 1}, {2, 1}}, {{0, 2}, {1, 2}}}));
+            (std::vector<TrackImages>{{{0, 0}, {1, 0}, {2, 0}}, {{0, 1}, {1, 1}, {2, 1}}, {{0, 2}, {1, 2}}}));
 }
 
 TEST(Tracks, RandomMatchesGiveConsistentTracksInAnyOrder) {
@@ -190,7 +190,7 @@ TEST(Tracks, RandomMatchesGiveConsistentTracksInAnyOrder) {
   }
   const TrackSet set = build_tracks(keypoints, pairs, {});
   std::set<std::pair<std::int64_t, std::int32_t>> seen;
-  for (const Sightings& track : to_lists(set)) {
+  for (const TrackImages& track : to_lists(set)) {
     EXPECT_GE(track.size(), 2u);
     for (std::size_t i = 0; i < track.size(); ++i) {
       EXPECT_TRUE(seen.insert(track[i]).second) << "a feature in two tracks";
@@ -212,7 +212,7 @@ TEST(Tracks, MinimumLength) {
   options.min_length = 3;
   const TrackSet set =
       build_tracks(make_keypoints(3, 3), {make_pair(0, 1, {{0, 0}, {1, 1}}), make_pair(1, 2, {{1, 2}})}, options);
-  EXPECT_EQ(to_lists(set), (std::vector<Sightings>{{{0, 1}, {1, 1}, {2, 2}}}));
+  EXPECT_EQ(to_lists(set), (std::vector<TrackImages>{{{0, 1}, {1, 1}, {2, 2}}}));
   options.min_length = 1;
   EXPECT_THROW(build_tracks(make_keypoints(1, 1), {}, options), InputError);
 }

@@ -192,23 +192,23 @@ TEST_P(PointKernels, EqualPlainMatrices) {
 
 // The observations of a point in two images of one frame are joined into one.
 TEST_P(PointKernels, MergeWhatAFrameSees) {
-  constexpr std::array<std::int64_t, 6> kSights{0, 0, 0, 1, 2, 2};
+  constexpr std::array<std::int64_t, 6> kGroups{0, 0, 0, 1, 2, 2};
   const auto merged = [&](const Kernels& kernels) {
     const std::vector<double> linearised = Worked::random(lane_kernels::kValueCount * kStride, 1);
     alignas(64) std::array<double, kCount * kRecordSize> records{};
     kernels.normal(linearised.data(), kStride, 8, records.data());
     const auto single = records;
-    kernels.merge(std::ssize(kSights), kSights.data(), records.data());
+    kernels.merge(std::ssize(kGroups), kGroups.data(), records.data());
     return std::pair(single, records);
   };
   const auto [single, records] = merged(*kernels_of_width(GetParam()));
-  for (std::size_t sight = 0; sight < 3; ++sight) {
+  for (std::size_t group = 0; group < 3; ++group) {
     for (std::size_t v = 0; v < 12; ++v) {
       double expected = 0;
-      for (std::size_t k = 0; k < kSights.size(); ++k)
-        if (kSights[k] == static_cast<std::int64_t>(sight))
+      for (std::size_t k = 0; k < kGroups.size(); ++k)
+        if (kGroups[k] == static_cast<std::int64_t>(group))
           expected = single[k * kRecordSize + v] + (v < kU ? expected : 0);  // one's u is all others', too
-      EXPECT_NEAR(records[sight * kRecordSize + v], expected, 1e-15 * (1 + std::abs(expected))) << sight << " " << v;
+      EXPECT_NEAR(records[group * kRecordSize + v], expected, 1e-15 * (1 + std::abs(expected))) << group << " " << v;
     }
   }
   EXPECT_EQ(records, merged(kPortable).second);

@@ -17,7 +17,7 @@
 
 namespace megablock {
 
-struct RigSight {
+struct ObservedPoint {
   RigRay ray;
   Eigen::Vector3d point = Eigen::Vector3d::Zero();       // ground frame, metres
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the point, m^2
@@ -26,44 +26,45 @@ struct RigSight {
 };
 
 // The whitened residual of an observation and its derivative by the pose.
-struct WhitenedSight {
+struct WhitenedResidual {
   Eigen::Vector2d residual;
   Eigen::Matrix<double, 2, 6> by_pose;
   double squared_px;
 };
 // Empty where the point is not in front of the camera.
-std::optional<WhitenedSight> whitened(const RigSight& sight, const Pose& pose, bool with_jacobian);
+std::optional<WhitenedResidual> whitened(const ObservedPoint& observation, const Pose& pose, bool with_jacobian);
 
 using PoseNormal = Eigen::Matrix<double, 6, 6>;
 // Adds the normal equations of the observations whose squared residuals do not exceed the limit.
-void add_normal_equations(std::span<const RigSight> sights, const Pose& pose, double limit_squared, PoseNormal& normal,
-                          PoseIncrement& right);
+void add_normal_equations(std::span<const ObservedPoint> observations, const Pose& pose, double limit_squared,
+                          PoseNormal& normal, PoseIncrement& right);
 
 // Draws samples of three points (gp3p.h), and refines a pose by a few least squares iterations.
-class RigSightEstimator {
+class ObservedPointEstimator {
  public:
   using Model = Pose;  // ground -> rig
   static constexpr std::size_t kSampleSize = 3;
   // The observations must outlive the object.
-  explicit RigSightEstimator(std::span<const RigSight> sights) : sights_(sights) {}
-  std::size_t size() const { return sights_.size(); }
+  explicit ObservedPointEstimator(std::span<const ObservedPoint> observations) : observations_(observations) {}
+  std::size_t size() const { return observations_.size(); }
   Solutions<Pose, 8> solve(const std::array<std::size_t, 3>& rows) const;
   // Squares of the whitened residuals; infinite behind a camera.
   auto squared_residuals(const Pose& pose) const {
-    return [sights = sights_, pose](std::size_t i) {
-      const auto w = whitened(sights[i], pose, false);
+    return [observations = observations_, pose](std::size_t i) {
+      const auto w = whitened(observations[i], pose, false);
       return w ? w->residual.squaredNorm() : std::numeric_limits<double>::infinity();
     };
   }
   std::optional<Pose> refine(Pose pose, double threshold) const;
 
  private:
-  std::span<const RigSight> sights_;
+  std::span<const ObservedPoint> observations_;
 };
 
 // Finds the pose with most inliers for a lost frame or a lost part of a tile, with up to 500 samples. Residuals up to
 // the threshold, in sigmas, are inliers. Empty where no pose is found; the caller decides whether the inliers are
 // enough.
-std::optional<Pose> find_lost_pose(std::span<const RigSight> sights, double threshold_sigmas, std::uint64_t seed);
+std::optional<Pose> find_lost_pose(std::span<const ObservedPoint> observations, double threshold_sigmas,
+                                   std::uint64_t seed);
 
 }  // namespace megablock
