@@ -65,7 +65,8 @@ void tracks(const Stage& stage, const Job& job, JobRecord& record, StageResults&
                                               : run_given_tracks(stage, job, record, results.tie_points, results.tiles);
   if (results.needs_tiles && results.tiles.tile_count == 0)
     throw AgreedError<ComputeError>(
-        "no two images could be matched: nothing to orient; check overlap, masks and the match options");
+        "no two frames are held together by enough tie points: nothing to orient; check overlap, masks and the options "
+        "'matching', or the given tie points");
   index_measurements(job, results.tracks);
 }
 
@@ -88,7 +89,7 @@ void orientation(const Stage& stage, const Job& job, JobRecord& record, StageRes
   job.tables.release();
   const auto& oriented = results.oriented.state.oriented;
   if (std::none_of(oriented.begin(), oriented.end(), [](auto o) { return o != 0; }))
-    throw AgreedError<ComputeError>(why_nothing_is_oriented(job.block));
+    throw AgreedError<ComputeError>(why_nothing_is_oriented(job.block, results.oriented.only_turned));
 }
 
 // Positions hold a block together although pairs are lost or turned. The halves of a split test begin with the focal

@@ -9,8 +9,9 @@ import re
 import unittest
 
 import h5py
+import numpy
 import pictures
-from program import megablock, status
+from program import FAILED_UNITS, megablock, status
 from small_block import CopyOfTheBlock, setUpModule, simulate, tearDownModule, work
 
 OPTIONS = "features:\n  max_features: 1200\n  max_megapixels: 2\n"
@@ -43,6 +44,30 @@ class EverydayInput(CopyOfTheBlock):
         self.assert_all_oriented(13, 12)
         self.assertIn("1 of 13 images has fewer than 50 keypoints: dark.png (0, grey values 12 to 12); check exposure, "
                       "focus and masks", status(self.job)["notes"])
+
+    def use(self, name):
+        self.folder = work / name
+        self.project, self.images, self.job = self.folder / "block.yaml", self.folder / "images", self.folder / "job"
+
+    def test_a_camera_that_only_turned_is_named(self):
+        simulate("turned", 8, 320, 240, "--scene", "panorama")
+        self.use("turned")
+        self.assertIn("no image could be oriented: the camera only turned about its projection centre",
+                      self.run_job(expect=FAILED_UNITS))
+
+    def test_sections_of_one_image_may_be_those_of_a_camera_that_only_turned(self):
+        random = numpy.random.default_rng(1)
+        whole = sum(numpy.kron(random.uniform(0, 255 / 4, (640 // s, 800 // s)), numpy.ones((s, s))) for s in (2, 4, 8, 16))
+        for file in self.files():
+            file.unlink()
+        for i in range(6):
+            section = whole[20 * i:20 * i + 300, 50 * i:50 * i + 400].astype(numpy.uint8)
+            pictures.write_png(self.images / f"section{i}.png", 400, 300, lambda y: section[y].tobytes())
+        for focal, named in (("", True), ("cameras: {default: {focal_px: 480}}\n", False)):
+            with self.subTest(focal=focal):
+                self.write_project(focal)
+                self.run_job()
+                self.assertEqual("flat ground, and a camera that only turned" in " ".join(status(self.job)["notes"]), named)
 
     def test_one_position_for_all_images_is_used_once(self):
         for file in self.files():

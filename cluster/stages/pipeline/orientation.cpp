@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <functional>
 #include <map>
 #include <set>
 
@@ -20,6 +21,7 @@
 #include "cluster/stages/common/block_hash.h"
 #include "cluster/stages/common/growth.h"
 #include "cluster/stages/common/units.h"
+#include "cluster/stages/pipeline/false_pairs.h"
 #include "cluster/stages/pipeline/features.h"
 #include "io/base/disjoint_sets.h"
 #include "io/base/error.h"
@@ -215,6 +217,32 @@ void unite_frames(const Block& block, const std::vector<VerifiedPair>& pairs, Di
   for (const VerifiedPair& pair : pairs) sets.unite(block.images[pair.a].frame.value, block.images[pair.b].frame.value);
 }
 
+bool nearly_all(const std::vector<VerifiedPair>& pairs, const std::function<bool(PairModel)>& is) {
+  constexpr double kNearlyAll = 0.95;
+  const auto count = std::ranges::count_if(pairs, [&](const VerifiedPair& pair) { return is(pair.model); });
+  return !pairs.empty() && static_cast<double>(count) >= kNearlyAll * static_cast<double>(pairs.size());
+}
+
+// Whether nearly all pairs are those of a camera that turned about its projection centre.
+bool show_no_parallax(const std::vector<VerifiedPair>& pairs) {
+  return nearly_all(pairs, [](PairModel model) { return model == PairModel::kRotationOnly; });
+}
+
+// A plane before a camera of unknown focal length has the same matches as one that only turned.
+bool show_one_plane_of_unknown_focal(const Block& block, const std::vector<VerifiedPair>& pairs) {
+  return std::ranges::none_of(block.cameras, &Camera::focal_known) && lacks_positions(block) &&
+         nearly_all(pairs, [](PairModel model) { return model != PairModel::kEssential; });
+}
+
+constexpr const char* kOnlyTurned =
+    "the camera only turned about its projection centre: the pairs of images show no parallax, so that nothing tells "
+    "distances; 'megablock calibrate --panoramic JOB' estimates rotations and focal length; for points, move the "
+    "camera between the images";
+constexpr const char* kOnePlane =
+    "each pair of images fits a plane, and no header tells the focal length: flat ground, and a camera that only "
+    "turned or cut sections of one image, have the same matches; if it turned, the positions and points of this result "
+    "mean nothing, and 'megablock calibrate --panoramic JOB' estimates its rotations; give 'focal_px' or positions";
+
 // Moves a part of the block that has neither positions nor given poses onto the control points.
 void align_part(const Stage& stage, const Job& job, JobRecord& record, const std::vector<FrameIndex>& frames,
                 BlockState& state) {
@@ -287,6 +315,7 @@ OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& 
   std::uint64_t previous = 0;
   std::int64_t images_before = 0;
   DisjointSets connected(std::ssize(job.block.frames));
+  bool one_plane = false;
   for (std::size_t g = 0; g < job.generations.size(); ++g) {
     const Block block = first_images(job.block, job.generations[g]);
     Hasher hasher;
@@ -295,6 +324,8 @@ OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& 
     add_block_values(hasher, block);
     const std::vector<VerifiedPair> pairs = pairs_of_generation(job, matches, job.generations[g], hasher);
     unite_frames(block, pairs, connected);
+    made.only_turned = show_no_parallax(pairs);
+    one_plane = !made.only_turned && show_one_plane_of_unknown_focal(block, pairs);
     Unit unit;
     unit.name = unit_name(stage.folder(), static_cast<std::int64_t>(g));
     unit.fingerprint = hasher.value();
@@ -316,13 +347,20 @@ OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& 
     images_before = job.generations[g];
   }
   tell_of_verticals(stage, job, record, aside, all);
+  if (std::ranges::any_of(state.oriented, [](std::uint8_t o) { return o != 0; })) {
+    if (made.only_turned)
+      add_note(job, record, stage.name,
+               std::string(kOnlyTurned) + "; positions and points of this result mean nothing");
+    if (one_plane) add_note(job, record, stage.name, kOnePlane);
+  }
   state = held_in_place(job, grow(state, job.block));
   made.moved = move_onto_control(stage, job, record, connected, own, state);
   return made;
 }
 
 // Positions that are all the same come from a receiver that had no fix, and contradict every base.
-std::string why_nothing_is_oriented(const Block& block) {
+std::string why_nothing_is_oriented(const Block& block, bool only_turned) {
+  if (only_turned) return std::string("no image could be oriented: ") + kOnlyTurned;
   constexpr double kSame_m = 1e-3;
   const Frame* first = nullptr;
   std::int64_t same = 0, others = 0;

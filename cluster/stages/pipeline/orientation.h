@@ -16,6 +16,7 @@ struct OrientationStage {
   BlockState state;
   std::map<FrameIndex, std::string> not_oriented;  // frames without a pose, and why
   std::vector<MovedPositions> moved;               // onto the control, by part of the block
+  bool only_turned = false;                        // nearly all pairs of images show no parallax
 };
 
 // Collective. `own` is the job's block. Verticals that are set aside leave it, and positions with an offset from the
@@ -23,7 +24,8 @@ struct OrientationStage {
 OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& record,
                                  const std::vector<std::string>& matches, Block& own);
 
-// The message for a block of which no image could be oriented: the likely cause and the remedy.
-std::string why_nothing_is_oriented(const Block& block);
+// The message for a block of which no image could be oriented: the likely cause and the remedy. `only_turned`: that of
+// OrientationStage.
+std::string why_nothing_is_oriented(const Block& block, bool only_turned);
 
 }  // namespace megablock
