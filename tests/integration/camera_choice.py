@@ -5,15 +5,16 @@ usage: camera_choice.py MEGABLOCK"""
 import pathlib
 import tempfile
 
+import h5py
 from program import megablock, status
 
 
 def choice(job):
-    """Number of the camera, mask and reason, without the trailer that seals the file."""
+    """Number of the camera, mask, focal length, its sigma and reason, without the trailer that seals the file."""
     line = (job / "cameras/000000.txt").read_bytes().split(b"\n")[0].decode()
-    camera, mask, contradicted, readout_us, reason = line.split(" ", 4)
+    camera, mask, contradicted, focal_px, sigma_px, readout_us, reason = line.split(" ", 6)
     assert contradicted == "0" and readout_us == "0"
-    return int(camera), int(mask), reason
+    return int(camera), int(mask), float(focal_px), float(sigma_px), reason
 
 
 def main():
@@ -30,8 +31,10 @@ def main():
         print(chosen[0], status(folder / "job10")["tiles"], "tiles")
         assert status(folder / "job10")["tiles"] > 1 and status(folder / "job200")["tiles"] == 1
         assert chosen[0] == chosen[1], chosen
-        camera, mask, reason = chosen[0]
+        camera, mask, focal_px, sigma_px, reason = chosen[0]
         assert camera == 0 and mask & 1 and mask & 8, "f and k1 of a lens with distortion"
+        with h5py.File(folder / "truth.h5") as truth:
+            assert 0 < sigma_px and abs(focal_px - truth["cameras/intrinsics"][0, 0]) < 4 * sigma_px, chosen[0]
         assert (folder / "job10/result/report.html").read_text().count(reason) == 2, "in the page and in its figures"
 
         # A run that goes on takes the same choice.
