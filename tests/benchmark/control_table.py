@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Spoils each mark and each coordinate of a control list in turn, leaves each point out in turn, and prints one table
 of each: whether the spoilt one is named, how far the block moves in its sigmas, and how far a point that is left out
 is off in its sigmas. Marks are moved by 100 px, coordinates by 10 m. Needs python3-h5py and numpy.
