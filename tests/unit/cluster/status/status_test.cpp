@@ -24,7 +24,7 @@ class StatusTest : public testing::Test {
  protected:
   StatusTest() : store_(scratch_.path("job")) {
     store_.create();
-    std::ofstream(store_.path("job.json")) << "{}";
+    std::ofstream(store_.path("job.json")) << R"({"settings": []})";
     SimulationOptions options;
     options.frames = 30;
     options.control_points = 3;
