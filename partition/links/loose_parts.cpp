@@ -10,6 +10,7 @@
 #include <numeric>
 #include <random>
 #include <set>
+#include <utility>
 
 #include "io/base/disjoint_sets.h"
 
@@ -148,7 +149,7 @@ class ScaleChanges {
     sample();
   }
 
-  // The relative scale of two bodies, from the samples. 0 where it is known.
+  // How far the scale of one body may change against the other's: rms of u_a - u_b over the samples.
   double spread(std::size_t a, std::size_t b) const {
     return (samples_.row(row(a)) - samples_.row(row(b))).norm() / std::sqrt(static_cast<double>(kSamples));
   }
@@ -248,9 +249,8 @@ void find_loose_parts(const Block& block, const BlockState& state, const LinkWei
   const std::size_t main = known.size() > 1 ? 0 : largest(bodies);  // the first body has the known lengths
   std::vector<std::size_t> order(bodies.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) {
-    return a == main || (b != main && bodies.frames(a).size() > bodies.frames(b).size());
-  });
+  std::ranges::stable_sort(order, {},
+                           [&](std::size_t b) { return std::pair(b != main, -std::ssize(bodies.frames(b))); });
   constexpr std::int64_t kNone = -2, kMain = -1;
   IndexedVector<FrameIndex, std::int64_t> part_of(state.oriented.size(), kNone);
   for (const std::size_t b : order) {

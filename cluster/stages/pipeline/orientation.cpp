@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <functional>
 #include <map>
 #include <set>
 
@@ -217,7 +216,7 @@ void unite_frames(const Block& block, const std::vector<VerifiedPair>& pairs, Di
   for (const VerifiedPair& pair : pairs) sets.unite(block.images[pair.a].frame.value, block.images[pair.b].frame.value);
 }
 
-bool nearly_all(const std::vector<VerifiedPair>& pairs, const std::function<bool(PairModel)>& is) {
+bool nearly_all(const std::vector<VerifiedPair>& pairs, auto is) {
   constexpr double kNearlyAll = 0.95;
   const auto count = std::ranges::count_if(pairs, [&](const VerifiedPair& pair) { return is(pair.model); });
   return !pairs.empty() && static_cast<double>(count) >= kNearlyAll * static_cast<double>(pairs.size());
