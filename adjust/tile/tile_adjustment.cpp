@@ -29,6 +29,7 @@
 #include <limits>
 #include <numeric>
 
+#include "adjust/problem/long_tracks.h"
 #include "adjust/terms/linearise.h"
 #include "adjust/tile/image_sigma.h"
 #include "adjust/tile/lost_frames.h"
@@ -154,7 +155,7 @@ class TileAdjuster {
     constexpr double kWide = 4;
     constexpr int kFew = 6;  // iterations: testing the rays again helps more than further iterations
     const std::vector<std::uint8_t> all = problem_.kept;
-    const bool dense = select_long_tracks();
+    const bool dense = choose_long_tracks(problem_);
     // In a dense tile the limit must include the observations that connect passes which start apart. With few tracks it
     // would then include too many gross errors.
     const double widest = 8 * options_.max_residual_sigmas * (dense ? kApart : 1);
@@ -229,40 +230,6 @@ class TileAdjuster {
     const double limit = options_.max_residual_sigmas * threshold_factor(problem_, robust_sigma(lengths, options_));
     const auto beyond = std::count_if(lengths.begin(), lengths.end(), [&](double length) { return length > limit; });
     return static_cast<double>(beyond) <= kHardlyAny * static_cast<double>(lengths.size());
-  }
-
-  // Selects enough tracks for each frame, the longest first, distributed over its images. Returns whether there are
-  // more.
-  bool select_long_tracks() {
-    // An image of a rig gets its share of the tracks of its frame. A tile that would keep more than half of its
-    // observations anyway is not dense: choosing would save nothing.
-    constexpr std::int64_t kEnough = 200, kFewest = 20;  // tracks of a frame, tracks of an image
-    std::vector<std::int64_t> images(problem_.frames.size(), 0);
-    for (const TileImage& image : problem_.images) ++images[image.frame.value];
-    std::vector<std::int64_t> enough;  // [images]
-    for (const TileImage& image : problem_.images)
-      enough.push_back(std::max(kFewest, kEnough / images[image.frame.value]));
-    if (problem_.observation_count() < 2 * std::accumulate(enough.begin(), enough.end(), std::int64_t{0})) return false;
-    std::vector<std::int64_t> order(problem_.points.size());
-    std::iota(order.begin(), order.end(), 0);
-    std::stable_sort(order.begin(), order.end(), [&](std::int64_t a, std::int64_t b) {
-      return problem_.begin[a + 1] - problem_.begin[a] > problem_.begin[b + 1] - problem_.begin[b];
-    });
-    std::vector<std::int64_t> covered(problem_.images.size(), 0);
-    for (std::int64_t p : order) {
-      bool needed = problem_.points[p].role == PointRole::kControl;
-      for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row) {
-        const std::int32_t image = problem_.image[row].value;
-        needed = needed || (problem_.kept[row] && covered[image] < enough[image]);
-      }
-      for (std::int64_t row = problem_.begin[p]; row < problem_.begin[p + 1]; ++row) {
-        if (!needed)
-          problem_.kept[row] = 0;
-        else if (problem_.kept[row])
-          ++covered[problem_.image[row].value];
-      }
-    }
-    return true;
   }
 
   // Estimates the sigma of the observations. Returns whether the weights have changed enough to matter.
