@@ -158,6 +158,9 @@ struct TileProblem {
   std::vector<LineTerm> lines;
   std::vector<VerticalTerm> verticals;
   std::map<std::string, std::vector<MeasuredTerm>> measured;  // by the key of their type
+  // Gross errors, which take no part (adjust/checks/prior_test.h).
+  std::vector<PositionTerm> positions_aside;
+  std::vector<PointTerm> point_priors_aside;
 
   RobustLoss image_loss, position_loss, control_loss, attitude_loss, relative_loss, line_loss, vertical_loss;
 

@@ -39,8 +39,9 @@ class PointPriors final : public ObservationType {
   }
   void scale_sigmas(TileProblem& problem, const SigmaScales& scales) const override {
     const double horizontal = scales[kControlHorizontal];
-    for (TileProblem::PointTerm& term : problem.point_priors)
-      if (!held(term)) term.sigma.array() *= Eigen::Array3d(horizontal, horizontal, scales[kControlHeight]);
+    for (auto* terms : {&problem.point_priors, &problem.point_priors_aside})
+      for (TileProblem::PointTerm& term : *terms)
+        if (!held(term)) term.sigma.array() *= Eigen::Array3d(horizontal, horizontal, scales[kControlHeight]);
   }
   ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const override {
     return automatic_term<3, 3>(residual::PointKnown{problem.point_priors[row]});

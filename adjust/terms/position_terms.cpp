@@ -58,9 +58,10 @@ class Positions final : public ObservationType {
     // GNSS heights are worse than horizontal positions, and their errors have other causes. They have a factor of their
     // own.
     const double horizontal = scales[kPositionHorizontal];
-    for (TileProblem::PositionTerm& term : problem.positions)
-      if (!held(term.prior))
-        term.prior.sigma.array() *= Eigen::Array3d(horizontal, horizontal, scales[kPositionHeight]);
+    for (auto* terms : {&problem.positions, &problem.positions_aside})
+      for (TileProblem::PositionTerm& term : *terms)
+        if (!held(term.prior))
+          term.prior.sigma.array() *= Eigen::Array3d(horizontal, horizontal, scales[kPositionHeight]);
   }
   ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const override {
     return automatic_term<3, kPoseBlock>(residual::PositionMeasured{problem.positions[row].prior});

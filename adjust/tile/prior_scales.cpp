@@ -91,6 +91,8 @@ void set_losses_from_afar(TileProblem& problem, const ObservationOptions& option
   problem.control_loss = options.control_loss.from_afar();
 }
 
+void set_no_losses(TileProblem& problem) { problem.position_loss = problem.control_loss = RobustLoss(); }
+
 void set_last_losses(TileProblem& problem, const ObservationOptions& options) {
   problem.position_loss = options.position_loss;
   problem.control_loss = options.control_loss;

@@ -50,8 +50,11 @@ PriorLengths prior_lengths(const TileProblem& problem, const TileState& state);
 // times the stated sigmas. The product of all factors is one, or three and more. Other kinds have the factor 1.
 SigmaScales contradicted_sigma_scales(const SigmaScales& now, const PriorLengths& lengths);
 
-// Sets the losses of positions and control points to those of the options, from afar or as they are.
+// Sets the losses of positions and control points: those of the options, from afar or as they are.
 void set_losses_from_afar(TileProblem& problem, const ObservationOptions& options);
+// None: in least squares a single gross error is the observation that contradicts the rest most (prior_test.h), where a
+// loss may have settled with it against good ones.
+void set_no_losses(TileProblem& problem);
 void set_last_losses(TileProblem& problem, const ObservationOptions& options);
 
 }  // namespace megablock

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "adjust/checks/prior_test.h"
 #include "adjust/terms/build_problem.h"
 #include "adjust/tile/image_sigma.h"
 #include "adjust/tile/sigma_scales.h"
@@ -20,6 +21,10 @@ ResultTile tile_of_result(const BlockResult& result, const ObservationOptions& o
   SigmaScales scales;
   for (std::size_t k = 0; k < kObservationKinds; ++k) scales.of[k] = result.observation_table.kinds[k].scale;
   scale_sigmas(problem, scales);
+  std::vector<PriorId> aside;
+  for (const FrameIndex frame : result.positions_aside) aside.push_back({frame.value, 0});
+  for (const std::int64_t row : result.control_aside) aside.push_back({row, 1});
+  set_aside(aside, problem);
   std::vector<Eigen::Vector3d> points = result.points;
   for (std::size_t row = 0; row < result.kept.size(); ++row) problem.kept[row] &= result.kept[row];
   for (std::size_t p = points.size(); p < problem.points.size(); ++p) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 
 #include "geometry/numbers/angles.h"
 #include "io/block/held_priors.h"
@@ -20,6 +21,7 @@ namespace megablock {
 
 namespace {
 
+constexpr std::size_t kMarks = 3;           // number of marks of a point that a line names
 constexpr std::size_t kNamed = 5;           // number of points or frames that a line names
 constexpr std::size_t kParts = 5;           // number of parts with a free datum that are described
 constexpr double kUnusableRotationDeg = 5;  // attitudes and heights with a larger sigma of the rotation are useless
@@ -172,22 +174,29 @@ struct Contradiction {
   double sigmas = 0, size = 0;  // of the difference; metres or degrees
 };
 
+// The limit that a remark states where the smallest difference is this one: the test without the observation, which
+// sets gross errors aside, is sharper than that of all differences.
+double shown_limit(double smallest) { return std::min(kContradicted, std::floor(smallest)); }
+
 // Names the frames whose observed position or attitude the block contradicts, worst first; empty if there are none.
+// The observations of the frames `aside` took no part.
 template <typename Residual>
 std::string contradicted_text(const BlockResult& result, const std::vector<Residual>& residuals, double held_sigma,
-                              const char* kind, double unit, const char* unit_name) {
+                              const char* kind, double unit, const char* unit_name,
+                              const std::vector<FrameIndex>& aside = {}) {
   std::vector<Contradiction> wrong;
   std::int64_t observed = 0;
   for (const Residual& r : residuals) {
     if (r.sigma.minCoeff() <= 2 * held_sigma) continue;  // the adjustment held this value, so it has no residual
     ++observed;
     const double sigmas = r.difference.cwiseQuotient(r.sigma).norm();
-    if (sigmas > kContradicted) wrong.push_back({r.frame, sigmas, r.difference.norm() * unit});
+    if (sigmas > kContradicted || std::ranges::binary_search(aside, r.frame))
+      wrong.push_back({r.frame, sigmas, r.difference.norm() * unit});
   }
   if (wrong.empty()) return "";
   std::stable_sort(wrong.begin(), wrong.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
   std::string text = fmt::format("{} of {} {} {} from the block by more than {:.0f} sigmas: ", wrong.size(), observed,
-                                 kind, wrong.size() == 1 ? "differs" : "differ", kContradicted);
+                                 kind, wrong.size() == 1 ? "differs" : "differ", shown_limit(wrong.back().sigmas));
   for (std::size_t i = 0; i < std::min(kNamed, wrong.size()); ++i)
     text += fmt::format("{}{} by {:.{}f} {}", i > 0 ? ", " : "", result.block.frames[wrong[i].frame].name,
                         wrong[i].size, wrong[i].size < 10 ? 2 : 0, unit_name);
@@ -259,15 +268,15 @@ std::vector<UnusedPoint> unused_points(const BlockResult& result, PointRole role
     const ControlPoint& given = result.block.control_points[p];
     const BlockResult::ControlResult& control = result.control[p];
     if (given.role != role || control.takes_part()) continue;
-    UnusedPoint point{p, {}, 0};
+    UnusedPoint point{p, {}};
     for (std::size_t m = 0; m < std::min(given.measurements.size(), control.residual_px.size()); ++m) {
       const double length = control.residual_px[m].norm();
-      if (std::isfinite(length) && (!point.image.valid() || length > point.worst_px))
-        point = {p, given.measurements[m].image, length};
+      if (std::isfinite(length)) point.marks.push_back({length, given.measurements[m].image});
     }
+    std::ranges::stable_sort(point.marks, std::greater(), &UnusedPoint::Mark::px);
     unused.push_back(point);
   }
-  std::stable_sort(unused.begin(), unused.end(), [](const auto& a, const auto& b) { return a.worst_px > b.worst_px; });
+  std::ranges::stable_sort(unused, std::greater(), &UnusedPoint::worst_px);
   return unused;
 }
 
@@ -280,10 +289,11 @@ std::string unused_points_text(const BlockResult& result, PointRole role) {
                   one ? "point" : "points", one ? "s" : "");
   for (std::size_t i = 0; i < std::min(kNamed, unused.size()); ++i) {
     const UnusedPoint& point = unused[i];
-    text += (i > 0 ? ", " : "") + result.block.control_points[point.point].name + " (" +
-            (point.image.valid() ? pixels(point.worst_px) + " px in " + result.block.name_of(point.image) + ", rejected"
-                                 : "not seen by an oriented image") +
-            ")";
+    text += (i > 0 ? ", " : "") + result.block.control_points[point.point].name + " (";
+    // Marks that contradict one another may all be rejected, and the worst need not be the wrong one.
+    for (std::size_t m = 0; m < std::min(kMarks, point.marks.size()); ++m)
+      text += pixels(point.marks[m].px) + " px in " + result.block.name_of(point.marks[m].image) + ", ";
+    text += point.marks.empty() ? "not seen by an oriented image)" : "rejected)";
   }
   if (unused.size() > kNamed) text += fmt::format(" and {} more", unused.size() - kNamed);
   return text;
@@ -353,7 +363,7 @@ std::vector<std::string> misstated_texts(const BlockResult& result) {
 std::vector<std::string> contradicted_texts(const BlockResult& result, const report::Figures& figures) {
   std::vector<std::string> lines;
   for (const std::string& text :
-       {contradicted_text(result, figures.positions, kHeldPositionSigma, "positions", 1, "m"),
+       {contradicted_text(result, figures.positions, kHeldPositionSigma, "positions", 1, "m", result.positions_aside),
         contradicted_text(result, figures.attitudes, kHeldAttitudeSigma, "attitudes", kDegreesPerRadian, "degrees")})
     if (!text.empty()) lines.push_back(text);
   return lines;
@@ -365,6 +375,7 @@ namespace {
 struct WrongPoint {
   const ControlPoint* point = nullptr;
   double sigmas = 0, metres = 0, worst_px = 0;
+  bool aside = false;  // the adjustment left its position out
 };
 
 // The length of adjusted - given over the sigmas of the adjustment, on the axes that are given. A check point's own
@@ -388,20 +399,27 @@ WrongPoint difference_of(const BlockResult& result, const ControlPoint& given,
 
 std::string wrong_points_text(const BlockResult& result, PointRole role) {
   std::vector<WrongPoint> wrong;
-  std::int64_t compared = 0;
+  std::int64_t compared = 0, aside = 0;
   for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
     const ControlPoint& given = result.block.control_points[p];
     if (given.role != role || !result.control[p].takes_part()) continue;
     ++compared;
-    const WrongPoint point = difference_of(result, given, result.control[p]);
-    if (point.sigmas > kContradicted) wrong.push_back(point);
+    WrongPoint point = difference_of(result, given, result.control[p]);
+    point.aside = std::ranges::binary_search(result.control_aside, static_cast<std::int64_t>(p));
+    if (!point.aside && !(point.sigmas > kContradicted)) continue;
+    aside += point.aside;
+    wrong.push_back(point);
   }
   if (wrong.empty()) return "";
   std::stable_sort(wrong.begin(), wrong.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
   const bool one = wrong.size() == 1, control = role == PointRole::kControl;
-  std::string text = fmt::format("{} of {} {} differ{} from the block by more than {:.0f} sigmas{}: ", wrong.size(),
-                                 compared, control ? "control points" : "check points", one ? "s" : "", kContradicted,
-                                 control ? (one ? " and has hardly any weight" : " and have hardly any weight") : "");
+  const char* part = !control ? ""
+                     : aside == std::ssize(wrong)
+                         ? (one ? " and takes no part" : " and take no part")
+                         : (one ? " and has hardly any weight" : " and have hardly any weight");
+  std::string text =
+      fmt::format("{} of {} {} differ{} from the block by more than {:.0f} sigmas{}: ", wrong.size(), compared,
+                  control ? "control points" : "check points", one ? "s" : "", shown_limit(wrong.back().sigmas), part);
   for (std::size_t i = 0; i < std::min(kNamed, wrong.size()); ++i)
     text += fmt::format("{}{} by {:.{}f} m (its marks fit within {} px)", i > 0 ? ", " : "", wrong[i].point->name,
                         wrong[i].metres, wrong[i].metres < 10 ? 3 : 1, pixels(wrong[i].worst_px));

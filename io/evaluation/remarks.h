@@ -18,13 +18,18 @@ struct Figures;
 // A control or check point without any measurement that takes part: all were rejected, or none is in an oriented image.
 struct UnusedPoint {
   std::size_t point = 0;  // row of block.control_points
-  ImageIndex image;       // the image of the worst measurement; invalid: none is in an oriented image
-  double worst_px = 0;    // the residual of this measurement
+  struct Mark {
+    double px = 0;  // residual
+    ImageIndex image;
+  };
+  std::vector<Mark> marks;  // in oriented images, the worst first
+  double worst_px() const { return marks.empty() ? 0 : marks.front().px; }
 };
 // The unused points, worst first. Empty if the result has no points.
 std::vector<UnusedPoint> unused_points(const BlockResult& result, PointRole role);
 
-// "2 control points take no part: 3 (1.4e6 px in 02.jpg), 7 (not seen by an oriented image)"; empty if there are none.
+// "2 control points take no part: 3 (1.4e6 px in 02.jpg, 31 px in 04.jpg, rejected), 7 (not seen by an oriented
+// image)"; empty if there are none.
 std::string unused_points_text(const BlockResult& result, PointRole role);
 
 // One line for each part of the block whose datum the observations do not determine, or whose rotations they determine

@@ -125,6 +125,9 @@ struct BlockResult : TrackResults {
     bool takes_part() const;  // whether any measurement does; otherwise the position does not depend on the block
   };
   std::vector<ControlResult> control;  // in block order
+  // Gross errors that the adjustment has set aside (adjust/checks/prior_test.h), ascending.
+  std::vector<FrameIndex> positions_aside;
+  std::vector<std::int64_t> control_aside;  // rows of `control`
 
   // The empirical covariances of the same unknowns, which residuals show (docs/reference/methods.md, "Sigmas"); those
   // above are the formal ones. Never multiplied by the variance factor. Empty if they were not computed.

@@ -271,6 +271,26 @@ void get_free_parts(const Hdf5Reader& file, BlockResult& result) {
   }
 }
 
+void put_set_aside(Hdf5Writer& file, const BlockResult& result) {
+  file.group("set_aside", "observations that contradict the rest of the block and take no part");
+  file.vector("set_aside/position", column(result.positions_aside, [](FrameIndex f) { return f.value; }),
+              {"", "frames"});
+  file.vector("set_aside/control", result.control_aside, {"", "rows of control"});
+}
+
+void get_set_aside(const Hdf5Reader& file, BlockResult& result) {
+  if (!file.has("set_aside")) return;
+  const auto checked = [&](const char* name, std::int64_t behind) {
+    auto list = file.vector<std::int64_t>(name);
+    for (const std::int64_t row : list)
+      if (row < 0 || row >= behind) file.fail(name, "names a row that is not there");
+    return list;
+  };
+  for (const std::int64_t frame : checked("set_aside/position", rows(result.block.frames)))
+    result.positions_aside.emplace_back(frame);
+  result.control_aside = checked("set_aside/control", rows(result.block.control_points));
+}
+
 }  // namespace
 
 namespace {
@@ -289,6 +309,7 @@ void put_head(Hdf5Writer& file, const BlockResult& result) {
 
 void put_tail(Hdf5Writer& file, const BlockResult& result) {
   put_control_results(file, result);
+  put_set_aside(file, result);
   put_free_parts(file, result.free_parts);
   put_observation_table(file, result.observation_table);
   put_seams(file, result.seams);
@@ -317,6 +338,7 @@ BlockResult get_head_and_tail(const Hdf5Reader& file) {
   if (file.has("control/empirical_covariance"))
     result.empirical.control = square_matrices<Eigen::Matrix3d>(
         file.array<double>("control/empirical_covariance", {rows(result.block.control_points), 3, 3}));
+  get_set_aside(file, result);
   get_free_parts(file, result);
   get_observation_table(file, result.observation_table);
   result.seams = get_seams(file);

@@ -39,7 +39,8 @@ def adjust(rows, check=()):
         centre, covariance = frames["centre"][:], frames["covariance"][:, 3:, 3:]
         names = [name.decode() for name in control["name"][:]]
         difference = control["adjusted"][:] - control["position"][:]
-        points = {n: (d, numpy.diag(c)) for n, d, c in zip(names, difference, control["covariance"][:])}
+        points = {n: (d, numpy.diag(c), s) for n, d, c, s in
+                  zip(names, difference, control["covariance"][:], control["sigma"][:])}
     remarks = " ".join(state["remarks"])
     scale = re.search(r"control, horizontal .*? used the stated sigmas times ([0-9.]+)", remarks)
     return {"exit": done.returncode, "iterations": state["global_iterations"], "remarks": remarks, "centre": centre,
@@ -74,12 +75,15 @@ if "marks" in WANTED or "coordinates" in WANTED:
 if "marks" in WANTED:
     for row in ROWS:
         result = adjust(spoilt([row], 3, 100 if float(row[3]) < MIDDLE else -100))  # it stays in its image
-        print_case(f"mark of {row[6]} in {row[5]}, 100 px", result, f"{row[6]} in {row[5]} by" in result["remarks"])
+        # "p1 in a.jpg by 100 px", or "p1 (100 px in a.jpg, 60 px in b.jpg, rejected)" where no mark of the point is left.
+        named = re.search(rf"\b{row[6]} (in {row[5]} by|\([^)]*px in {row[5]}, )", result["remarks"])
+        print_case(f"mark of {row[6]} in {row[5]}, 100 px", result, named)
 if "coordinates" in WANTED:
     for point in POINTS:
         for column, axis in ((0, "x"), (1, "y")):
             result = adjust(spoilt([row for row in ROWS if row[6] == point], column, 10))
-            print_case(f"{axis} of {point}, 10 m", result, re.search(rf"\b{point} by [0-9.]+ m", result["remarks"]))
+            named = re.search(rf"\b{point} (by [0-9.]+ m|\([^)]*, rejected)", result["remarks"])
+            print_case(f"{axis} of {point}, 10 m", result, named)
 if cases:
     print(f"\nof {len(cases)}: {sum(c[0] for c in cases)} end with 0, {sum(bool(c[1]) for c in cases)} are named, "
           f"{sum(bool(c[2]) for c in cases)} move the block by at most one sigma")
@@ -91,9 +95,9 @@ if "points" in WANTED:
         if point not in result["points"] or not numpy.isfinite(result["points"][point][0][:2]).all():
             print(f"| {point} | not intersected | | |", flush=True)
             continue
-        difference, variance = result["points"][point]
+        difference, variance, stated = result["points"][point]
         # The point's own coordinates are as uncertain as those of the others.
-        sigma = numpy.sqrt(variance[:2] + (0.01 * result["scale"]) ** 2)
+        sigma = numpy.sqrt(variance[:2] + (stated[:2] * result["scale"]) ** 2)
         ratios += list(difference[:2] / sigma)
         print(f"| {point} | {difference[0]:.2f}, {difference[1]:.2f} | {sigma[0]:.2f}, {sigma[1]:.2f} | "
               f"{difference[0] / sigma[0]:.2f}, {difference[1] / sigma[1]:.2f} |", flush=True)

@@ -3,7 +3,8 @@
 
 A simulated block without positions hangs on six control points. Each point in turn gets a coordinate that is 10 m off,
 or a mark that is 100 px off. The poses must stay within one sigma of those that the block has without the wrong
-coordinates (the point is a check point there), or without the wrong mark.
+coordinates (the point is a check point there), or without the wrong mark. A second block is as small and its control as
+coarse that it bends to a wrong point: residuals alone do not show it. The same holds for a block with few positions.
 """
 import csv
 import pathlib
@@ -43,17 +44,17 @@ class WrongControl(unittest.TestCase):
     def tearDownClass(cls):
         shutil.rmtree(cls.work)
 
-    def run_changed(self, name, change):
+    def run_changed(self, name, change, block=None):
         """Runs a copy of the block after change(given.h5)."""
         folder = self.work / name
-        shutil.copytree(self.block, folder)
+        shutil.copytree(block or self.block, folder)
         with h5py.File(folder / "given.h5", "r+") as given:
             change(given)
         return run(folder / "block.yaml", folder / "job")
 
-    def spoil(self, name, change, right):
+    def spoil(self, name, change, right, block=None):
         """Runs the block with an error, compares its poses with those of `right`, and returns the remarks."""
-        wrong, poses = self.run_changed(name, change)
+        wrong, poses = self.run_changed(name, change, block)
         self.assertEqual(poses.keys(), right.keys())
         for image, row in poses.items():
             before = right[image]
@@ -75,6 +76,35 @@ class WrongControl(unittest.TestCase):
             _, right = self.run_changed(f"check-{point}", check)
             said = self.spoil(f"coordinate-{point}", change, right)
             self.assertRegex(said, rf"1 of 6 control points differs.*: {name} by (9\.[5-9]|10\.[0-5])\d* m")
+
+    def simulated(self, name, *options):
+        block = self.work / name
+        megablock("simulate", "--frames", 12, *options, "-o", block)
+        return block
+
+    def test_a_coordinate_to_which_the_block_bends_is_named_and_moves_nothing(self):
+        block = self.simulated("weak", "--gps-sigma", 0, "--control-points", 6, "--control-sigma", 0.5)
+        for point in range(6):
+            def change(given, point=point):
+                given["control/position"][point, 2 * (point % 2)] += 10  # twenty sigmas
+
+            def check(given, point=point):
+                given["control/role"][point] = CHECK_POINT
+            _, right = self.run_changed(f"weak-check-{point}", check, block)
+            said = self.spoil(f"weak-{point}", change, right, block)
+            self.assertRegex(said, rf"1 of 6 control points differs.*takes no part: control{point} by ")
+
+    def test_a_position_to_which_the_block_bends_is_named_and_moves_nothing(self):
+        block = self.simulated("positions", "--gps-sigma", 0.5)
+        for frame in (0, 5, 11):
+            def change(given, frame=frame):
+                given["frames/position_prior/position"][frame, frame % 3] += 10
+
+            def without(given, frame=frame):
+                given["frames/position_prior/present"][frame] = 0
+            _, right = self.run_changed(f"positions-without-{frame}", without, block)
+            said = self.spoil(f"positions-{frame}", change, right, block)
+            self.assertRegex(said, r"1 of 12 positions differs from the block")
 
     def test_a_mark_is_named_and_moves_nothing(self):
         first = 0

@@ -92,6 +92,12 @@ BlockResult assemble_result(const Job& job, const JobRecord& record, Block& bloc
   result.mount_covariance = std::move(outcome.formal.mount_covariance);
   result.empirical = std::move(outcome.empirical);
   append_control(result, parts);
+  std::ranges::sort(outcome.aside);
+  for (const PriorId& prior : outcome.aside)
+    if (prior.is_control)
+      result.control_aside.push_back(prior.row);
+    else
+      result.positions_aside.emplace_back(prior.row);
   find_boundary(result, parts);
   result.chi2 = outcome.chi2;
   result.degrees_of_freedom = outcome.degrees_of_freedom;

@@ -66,9 +66,9 @@ constexpr int kMostRoundsAfar = 3;
 // beyond the first do not count.
 int most_rounds(const MergeSettings& settings, const MergePosition& position) {
   constexpr int kSigmaRounds = 10, kScaleRounds = 1;
-  const int repeated = std::max(0, position.rounds_afar - 1);
-  if (settings.estimate_sigmas) return std::max(settings.screening_rounds, kSigmaRounds) + repeated;
-  return settings.screening_rounds + (position.scales.matter() ? kScaleRounds : 0) + repeated;
+  const int before = static_cast<int>(position.first_round) + std::max(0, position.rounds_afar - 1);
+  if (settings.estimate_sigmas) return before + std::max(settings.screening_rounds, kSigmaRounds);
+  return before + settings.screening_rounds + (position.scales.matter() ? kScaleRounds : 0);
 }
 
 bool converged(const GlobalState& state) {
@@ -131,12 +131,37 @@ BlockState load_block(const Job& job, MergeInputs& inputs, const MergeCheckpoint
         if (found) {
           checkpoint.load_tile(tile);
           scale_sigmas(tile.problem, found->scales);
+          set_aside(found->verdicts.get().aside, tile.problem);
         } else {
           set_image_sigma(tile.problem, start_sigma);
         }
       },
       tiles);
   return std::move(start.state);
+}
+
+// Begins the next adjustment of the block, in the round that `position` gives.
+void begin_adjustment(MergePosition& position, const GlobalOptions& options) {
+  position.tried_steps += position.global.iterations;
+  const std::int32_t accepted = position.global.accepted, held = position.global.held;
+  position.global = start_global(options);
+  position.global.accepted = accepted;
+  position.global.held = held;
+}
+
+// Whether positions and control points are tested before the last round: where gross errors are sought, and where a
+// block with scaled sigmas does not converge, from which a gross error may keep it for long.
+bool asks_for_tests(const MergePosition& position, bool converged) {
+  if (position.near == 0) return position.gross_errors == MergePosition::kSought;
+  return !converged && position.gross_errors == MergePosition::kNotSought && position.scales.matter();
+}
+
+// Begins from afar again, because a gross error bends the block, until good observations seem wrong.
+void begin_again(MergePosition& position, const GlobalOptions& options) {
+  position.first_round = ++position.round;
+  position.rounds_afar = 0;
+  position.near = 0;
+  begin_adjustment(position, options);
 }
 
 Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& checkpoint) {
@@ -147,7 +172,9 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
       distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
   const std::optional<MergePosition> found = checkpoint.find();
   const MergePosition start =
-      found ? *found : MergePosition{0, 0, start_global(options_of(job.settings.merge, frames, false, false)), {}};
+      found
+          ? *found
+          : MergePosition{0, 0, start_global(options_of(job.settings.merge, frames, false, false)), {}, 0, 0, 0, 0, {}};
   const MemoryOptions memory = memory_of_rank(job);
   SweepRecorder recorder(memory.scratch, job.options.record_s, stop_requested);
   const std::optional<MergePosition> within = checkpoint.find_sweep(start, recorder);
@@ -168,7 +195,7 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
     if (last) position.near = 1;
     const bool near = position.near != 0;
     const GlobalOptions options = options_of(job.settings.merge, frames, near, last);
-    set_losses(job, near, tiles);
+    set_losses(job, position, tiles);
     MergeTreeRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(memory, tiles));
     runner.record_sweeps(recorder);
     return_freed_memory();  // memory from which the plans were made
@@ -191,10 +218,20 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
     follow(block, tiles);
     if (last) {
       find_posterior(job, inputs, references, runner, adjusted);
+      if (judge_priors(job, adjusted.prior_tests, tiles, position)) {
+        begin_again(position, options);
+        checkpoint.write(position, tiles, block);
+        continue;
+      }
       if (job.settings.merge.empirical_sigmas) find_empirical(job, runner, adjusted);
       adjusted.costs = gather_costs(job, tiles, runner);
       say_costs(job, adjusted.costs);
       break;
+    }
+    if (asks_for_tests(position, adjusted.converged) && judge_priors(job, test_priors(runner), tiles, position)) {
+      begin_again(position, options);
+      checkpoint.write(position, tiles, block);
+      continue;
     }
     bool changed = adopt_image_sigma(job, tiles, rank_of_tile.size(), block);
     if (job.settings.merge.estimate_sigmas) changed = adopt_sigma_scales(runner, tiles, position.scales) || changed;
@@ -206,11 +243,7 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
       position.near = adjusted.converged || position.rounds_afar == kMostRoundsAfar;
     }
     position.round = changed ? position.round + 1 : most_rounds(job.settings.merge, position);
-    position.tried_steps += position.global.iterations;
-    const std::int32_t accepted = position.global.accepted, held = position.global.held;
-    position.global = start_global(options);
-    position.global.accepted = accepted;
-    position.global.held = held;
+    begin_adjustment(position, options);
     checkpoint.write(position, tiles, block);
   }
   adjusted.image_sigma_px = common_image_sigma(job, tiles);

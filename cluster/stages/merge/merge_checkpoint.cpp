@@ -43,9 +43,11 @@ TileAdjustment snapshot(const RankTile& tile) {
 std::string tile_unit(const std::string& folder, std::int64_t tile) { return unit_name(folder, tile); }
 
 // The layout of the marker as docs/reference/file-formats.md describes it.
-static_assert(sizeof(MergePosition) == 120 + 8 * kObservationKinds && offsetof(MergePosition, tried_steps) == 4 &&
-              offsetof(MergePosition, global) == 8 && offsetof(MergePosition, scales) == 112 &&
+static_assert(sizeof(MergePosition) == 144 + 8 * kObservationKinds + 24 * 32 &&
+              offsetof(MergePosition, tried_steps) == 4 && offsetof(MergePosition, global) == 8 &&
+              offsetof(MergePosition, scales) == 112 &&
               offsetof(MergePosition, rounds_afar) == 112 + 8 * kObservationKinds &&
+              offsetof(MergePosition, first_round) == 120 + 8 * kObservationKinds &&
               offsetof(GlobalState, lambda) == 8 && offsetof(GlobalState, decrement_squared) == 48 &&
               offsetof(GlobalState, accepted) == 84 && offsetof(GlobalState, curvature) == 88 &&
               offsetof(GlobalState, held) == 100);
@@ -65,6 +67,29 @@ MergePosition read_marker(const std::string& path) {
 }
 
 }  // namespace
+
+PriorVerdicts StoredVerdicts::get() const {
+  PriorVerdicts all;
+  for (std::int64_t i = 0; i < count; ++i) {
+    const Verdict& verdict = verdicts[static_cast<std::size_t>(i)];
+    (verdict.aside ? all.aside : all.cleared).push_back(verdict.prior);
+  }
+  return all;
+}
+
+PriorVerdicts StoredVerdicts::store(const PriorVerdicts& change) {
+  PriorVerdicts stored;
+  for (const PriorId& prior : change.aside) {
+    if (count == std::ssize(verdicts)) break;
+    verdicts[static_cast<std::size_t>(count++)] = {prior, 1};
+    stored.aside.push_back(prior);
+  }
+  for (const PriorId& prior : change.cleared) {
+    std::ranges::find(verdicts, prior, &Verdict::prior)->aside = 0;
+    stored.cleared.push_back(prior);
+  }
+  return stored;
+}
 
 std::string MergeCheckpoint::folder(const MergePosition& position) const {
   char text[64];

@@ -3,8 +3,11 @@
 // valid checkpoint, with the same bits.
 #pragma once
 
+#include <array>
 #include <optional>
+#include <vector>
 
+#include "adjust/checks/prior_test.h"
 #include "adjust/tile/sigma_scales.h"
 #include "cluster/job/job.h"
 #include "cluster/process/progress.h"
@@ -15,6 +18,19 @@
 
 namespace megablock {
 
+// The verdicts on observations that seemed wrong, in a list of fixed length, as a marker holds it.
+struct StoredVerdicts {
+  struct Verdict {
+    PriorId prior;
+    std::int64_t aside = 0;  // 1: set aside; 0: taken back
+  };
+  std::int64_t count = 0;
+  std::array<Verdict, 32> verdicts{};
+  PriorVerdicts get() const;
+  // Stores a change as far as there is room, and returns what was stored.
+  PriorVerdicts store(const PriorVerdicts& change);
+};
+
 struct MergePosition {
   std::int32_t round = 0;        // number of the round of screening
   std::int32_t tried_steps = 0;  // in earlier adjustments
@@ -22,6 +38,10 @@ struct MergePosition {
   SigmaScales scales;            // factors of the stated sigmas
   std::int32_t rounds_afar = 0;  // ended adjustments with losses that pull from any distance (prior_scales.h)
   std::int32_t near = 0;         // 1: the losses are those of the options
+  std::int64_t first_round = 0;  // round in which the block last began again, to seek gross errors or without them
+  enum Seeking : std::int64_t { kNotSought, kSought, kNoneFound };
+  std::int64_t gross_errors = kNotSought;  // kSought: the block begins from afar to find them
+  StoredVerdicts verdicts;
 };
 
 class MergeCheckpoint {

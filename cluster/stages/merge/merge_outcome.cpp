@@ -173,7 +173,10 @@ std::string scored_path(const Job& job, std::int64_t tile) {
 void find_posterior(const Job& job, const MergeInputs& inputs, const std::vector<MotionReference>& references,
                     MergeTreeRunner& runner, Adjusted& adjusted) {
   std::filesystem::create_directories(job.store.path("merge/parts"));
+  adjusted.parts.clear();
+  adjusted.prior_tests = {};
   adjusted.posterior = runner.posterior([&](const RankTile& tile, const TileCovariance& covariance) {
+    adjusted.prior_tests.add(test_priors(tile.problem, tile.state, covariance.frames, covariance.points));
     write_covariances(covariance_path(job, tile.tile), tile.problem, covariance);
     const auto t = static_cast<std::size_t>(tile.tile);
     const TrackSet tracks = read_split_tracks(job, inputs.tracks[t], inputs.adjusted[t]);
@@ -185,6 +188,7 @@ void find_posterior(const Job& job, const MergeInputs& inputs, const std::vector
     adjusted.parts.back().motion =
         common_motion(tile.problem, tile.state, references[static_cast<std::size_t>(component)]);
   });
+  if (adjusted.posterior.gauge.free()) adjusted.prior_tests = {};
 }
 
 void find_empirical(const Job& job, MergeTreeRunner& runner, Adjusted& adjusted) {
@@ -241,6 +245,7 @@ std::vector<std::string> judge_kept(const std::vector<TilePart>& parts) {
 MergeOutcome make_outcome(const Job& job, Adjusted& adjusted, const Tiles& tiles) {
   MergeOutcome outcome;
   outcome.state = std::move(adjusted.state);
+  outcome.aside = adjusted.position.verdicts.get().aside;
   outcome.formal = read_covariances(job, tiles, outcome.state, covariance_path);
   outcome.formal.joint_covariance = joint_covariance(adjusted.posterior.frames);
   if (job.settings.merge.empirical_sigmas) {

@@ -20,6 +20,7 @@ struct MergeOutcome {
   std::int64_t degrees_of_freedom = 0;
   double variance_factor() const { return degrees_of_freedom > 0 ? chi2 / static_cast<double>(degrees_of_freedom) : 1; }
   double image_sigma_px = 0;  // sigma of the tie point observations in the adjustment
+  std::vector<PriorId> aside;
   int global_iterations = 0;
   double newton_decrement = 0;
   std::string gauge;
@@ -33,6 +34,7 @@ struct Adjusted {
   MergeTreeRunner::Posterior posterior;
   CovarianceMatrix scored_frames;  // Posterior::frames with the scores of clusters
   std::vector<TilePart> parts;     // parts of the tiles of this rank
+  PriorTests prior_tests;          // of the same tiles; empty where the datum is free
   double image_sigma_px = 0;       // sigma of the tie point observations
   MergePosition position;
   MergeCosts costs;  // costs of the last adjustment

@@ -99,12 +99,14 @@ void follow(const BlockState& state, TileStore& tiles) {
         row, [&](RankTile& tile) { tile.state = make_tile_state(tile.problem, state, std::move(tile.state.points)); });
 }
 
-void set_losses(const Job& job, bool near, TileStore& tiles) {
+void set_losses(const Job& job, const MergePosition& position, TileStore& tiles) {
   const ObservationOptions& options = job.settings.adjustment.observations;
   for (std::size_t row = 0; row < tiles.size(); ++row)
     tiles.change_outline(row, [&](RankTile& tile) {
-      if (near)
+      if (position.near)
         set_last_losses(tile.problem, options);
+      else if (position.gross_errors == MergePosition::kSought)
+        set_no_losses(tile.problem);
       else
         set_losses_from_afar(tile.problem, options);
     });
@@ -143,6 +145,63 @@ bool adopt_sigma_scales(MergeTreeRunner& runner, TileStore& tiles, SigmaScales& 
   const SigmaScales change = next_sigma_scales(scales, runner.posterior().observations);
   if (!change.matter()) return false;
   multiply_sigmas(change, tiles, scales);
+  return true;
+}
+
+PriorTests test_priors(MergeTreeRunner& runner) {
+  PriorTests tests;
+  const auto posterior = runner.posterior([&](const RankTile& tile, const TileCovariance& covariance) {
+    tests.add(test_priors(tile.problem, tile.state, covariance.frames, covariance.points));
+  });
+  return posterior.gauge.free() ? PriorTests() : tests;
+}
+
+namespace {
+
+PriorTests gather_tests(const Job& job, const PriorTests& tests) {
+  ByteWriter writer;
+  writer.value(tests.positions);
+  writer.value(tests.control);
+  writer.values(tests.far_off);
+  writer.values(tests.aside);
+  PriorTests all;
+  for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
+    ByteReader reader(bytes);
+    PriorTests some;
+    some.positions = reader.value<LengthCounts>();
+    some.control = reader.value<LengthCounts>();
+    some.far_off = reader.values<PriorTest>();
+    some.aside = reader.values<PriorTest>();
+    all.add(some);
+  }
+  return all;
+}
+
+}  // namespace
+
+bool judge_priors(const Job& job, const PriorTests& tests, TileStore& tiles, MergePosition& position) {
+  using enum ObservationKind;
+  const auto scaled = [&](ObservationKind horizontal, ObservationKind height) {
+    return position.scales[horizontal] != 1 || position.scales[height] != 1;
+  };
+  const bool afar = position.near == 0;
+  PriorVerdicts change =
+      change_verdicts(gather_tests(job, tests), position.verdicts.get(),
+                      {scaled(kPositionHorizontal, kPositionHeight), scaled(kControlHorizontal, kControlHeight)});
+  if (!afar && !change.aside.empty()) {
+    if (position.gross_errors == MergePosition::kNoneFound) return false;
+    position.gross_errors = MergePosition::kSought;
+    return true;
+  }
+  change = position.verdicts.store(change);
+  const bool changed = !change.aside.empty() || !change.cleared.empty();
+  position.gross_errors = changed || !afar ? MergePosition::kNotSought : MergePosition::kNoneFound;
+  if (!changed) return false;
+  for (std::size_t row = 0; row < tiles.size(); ++row)
+    tiles.change(row, [&](RankTile& tile) {
+      set_aside(change.aside, tile.problem);
+      take_back(change.cleared, tile.problem);
+    });
   return true;
 }
 

@@ -10,6 +10,7 @@
 #include "adjust/tile/prior_scales.h"
 #include "adjust/tile/sigma_scales.h"
 #include "cluster/job/job.h"
+#include "cluster/stages/merge/merge_checkpoint.h"
 #include "cluster/stages/merge/merge_start.h"
 #include "merge/tree/merge_tree_runner.h"
 
@@ -35,8 +36,9 @@ BlockState gather_state(const Job& job, const BlockState& start, const TileStore
 // Gives the present state to every tile, before its observations are tested against it.
 void follow(const BlockState& state, TileStore& tiles);
 
-// Gives the tiles the losses of the options, or those that pull from any distance (prior_scales.h).
-void set_losses(const Job& job, bool near, TileStore& tiles);
+// Gives the tiles the losses of the options, those that pull from any distance, or none where gross errors are sought
+// (prior_scales.h).
+void set_losses(const Job& job, const MergePosition& position, TileStore& tiles);
 // Collective. Multiplies the sigmas of positions and control points that are stated far too small (prior_scales.h).
 // Returns whether they have changed so much that another adjustment is needed.
 bool adopt_contradicted_scales(const Job& job, TileStore& tiles, SigmaScales& scales);
@@ -44,6 +46,14 @@ bool adopt_contradicted_scales(const Job& job, TileStore& tiles, SigmaScales& sc
 // Collective. Whether the sigmas of positions, attitudes and relative poses have changed so much that another
 // adjustment is needed.
 bool adopt_sigma_scales(MergeTreeRunner& runner, TileStore& tiles, SigmaScales& scales);
+
+// Collective. The tests of the positions and control points of this rank's tiles at the solution.
+PriorTests test_priors(MergeTreeRunner& runner);
+
+// Collective. Judges positions and control points by the tests of all ranks; `tests` are those of this rank's tiles.
+// Sets observations aside, where the block was adjusted without losses to find gross errors (`position` says so), or
+// takes them back. Returns whether the block must begin again: after such a change, or to seek gross errors.
+bool judge_priors(const Job& job, const PriorTests& tests, TileStore& tiles, MergePosition& position);
 
 // Collective. Tests every observation at the solution again. Returns the number of changed decisions in the whole
 // block.

@@ -219,6 +219,7 @@ TEST(Remarks, PointsThatAreNotSeenAndTheWorstFirst) {
     for (auto& residual : result.control[p].residual_px) residual.setConstant(std::nan(""));
     if (p + 1 == result.control.size()) {
       result.control[p].residual_px[0] = {4810, 0};
+      result.control[p].residual_px[1] = {0, 52};
       result.control[p].kept.assign(result.control[p].residual_px.size(), 0);
     }
   }
@@ -226,7 +227,8 @@ TEST(Remarks, PointsThatAreNotSeenAndTheWorstFirst) {
   ASSERT_EQ(last.role, PointRole::kCheck);
   EXPECT_THAT(unused_points_text(result, PointRole::kCheck),
               testing::StartsWith("5 check points take no part: " + last.name + " (4810 px in " +
-                                  result.block.name_of(last.measurements[0].image) + ", rejected), "));
+                                  result.block.name_of(last.measurements[0].image) + ", 52.0 px in " +
+                                  result.block.name_of(last.measurements[1].image) + ", rejected), "));
   EXPECT_THAT(unused_points_text(result, PointRole::kCheck), HasSubstr(" (not seen by an oriented image), "));
   EXPECT_EQ(unused_points_text(result, PointRole::kControl), "");
 }
