@@ -177,6 +177,9 @@ PriorTests gather_tests(const Job& job, const PriorTests& tests) {
   return all;
 }
 
+// Whether observations with this loss may be ignored; others shall pull from any distance.
+bool forgets(const RobustLoss& loss) { return loss.from_afar().kind != loss.kind; }
+
 }  // namespace
 
 bool judge_priors(const Job& job, const PriorTests& tests, TileStore& tiles, MergePosition& position) {
@@ -185,8 +188,13 @@ bool judge_priors(const Job& job, const PriorTests& tests, TileStore& tiles, Mer
     return position.scales[horizontal] != 1 || position.scales[height] != 1;
   };
   const bool afar = position.near == 0;
+  const ObservationOptions& options = job.settings.adjustment.observations;
+  PriorTests all = gather_tests(job, tests);
+  std::erase_if(all.far_off, [&](const PriorTest& test) {
+    return !forgets(test.prior.is_control ? options.control_loss : options.position_loss);
+  });
   PriorVerdicts change =
-      change_verdicts(gather_tests(job, tests), position.verdicts.get(),
+      change_verdicts(all, position.verdicts.get(),
                       {scaled(kPositionHorizontal, kPositionHeight), scaled(kControlHorizontal, kControlHeight)});
   if (!afar && !change.aside.empty()) {
     if (position.gross_errors == MergePosition::kNoneFound) return false;
