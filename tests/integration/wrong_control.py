@@ -94,6 +94,16 @@ class WrongControl(unittest.TestCase):
             said = self.spoil(f"weak-{point}", change, right, block)
             self.assertRegex(said, rf"1 of 6 control points differs.*takes no part: control{point} by ")
 
+    def test_it_is_found_without_rounds_of_screening(self):
+        block = self.simulated("unscreened", "--gps-sigma", 0, "--control-points", 6, "--control-sigma", 0.5)
+        project = block / "block.yaml"
+        project.write_text(project.read_text() + "merge: {screening_rounds: 0}\n")
+
+        def change(given):
+            given["control/position"][3, 2] += 10
+        wrong, _ = self.run_changed("unscreened-3", change, block)
+        self.assertRegex("\n".join(wrong["remarks"]), "takes no part: control3 by ")
+
     def test_a_position_to_which_the_block_bends_is_named_and_moves_nothing(self):
         block = self.simulated("positions", "--gps-sigma", 0.5)
         for frame in (0, 5, 11):

@@ -191,7 +191,8 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
   recorder.set_position([&] { return checkpoint.of_sweep(position); });
   std::int32_t saved = position.global.accepted;
   for (;;) {
-    const bool last = position.round >= most_rounds(job.settings.merge, position);
+    const bool last = position.gross_errors != MergePosition::kSought &&
+                      position.round >= most_rounds(job.settings.merge, position);
     if (last) position.near = 1;
     const bool near = position.near != 0;
     const GlobalOptions options = options_of(job.settings.merge, frames, near, last);

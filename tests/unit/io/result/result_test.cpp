@@ -66,6 +66,8 @@ BlockResult example_result() {
   result.newton_decrement = 1e-8;
   result.decrement_limit = 0.01;
   result.free_parts = {{FrameIndex(0), 7}, {FrameIndex(1), 4}};
+  result.positions_aside = {FrameIndex(1)};
+  result.control_aside = {0};
   for (std::size_t i = 0; i < result.block.images.size(); ++i)
     result.image_records.push_back({640, 480 + static_cast<int>(i), 100, 3, 70});
   result.provenance = {
@@ -132,6 +134,8 @@ TEST(ResultFile, EverythingComesBack) {
   EXPECT_EQ(back.global_iterations, 4);
   EXPECT_EQ(back.newton_decrement, result.newton_decrement);
   EXPECT_EQ(back.decrement_limit, result.decrement_limit);
+  EXPECT_EQ(back.positions_aside, result.positions_aside);
+  EXPECT_EQ(back.control_aside, result.control_aside);
   ASSERT_EQ(back.free_parts.size(), 2u);
   EXPECT_EQ(back.free_parts[1].frame, FrameIndex(1));
   EXPECT_EQ(back.free_parts[1].defect, 4);
