@@ -9,6 +9,7 @@
 #include "cluster/outcome/diagnostics.h"
 #include "io/evaluation/evaluate.h"
 #include "io/evaluation/feature_statistics.h"
+#include "io/evaluation/control_remarks.h"
 #include "io/evaluation/remarks.h"
 #include "io/report/sections/sections.h"
 #include "io/result/track_batches.h"

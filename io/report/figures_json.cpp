@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "io/evaluation/remarks.h"
+#include "io/evaluation/control_remarks.h"
 #include "io/report/sections/sections.h"
 
 namespace megablock::report {

@@ -1,0 +1,156 @@
+#include "io/evaluation/control_remarks.h"
+
+#include <fmt/core.h>
+
+#include <functional>
+
+#include "io/evaluation/used_sigmas.h"
+#include "io/text/counted.h"
+
+namespace megablock {
+
+namespace {
+
+constexpr std::size_t kMarks = 3;  // number of marks of a point that a line names
+
+// A length in pixels, which may be impossibly large: 12.3, 4810, 1.4e6.
+std::string pixels(double value) {
+  if (value < 100) return fmt::format("{:.1f}", value);
+  if (value < 1e5) return fmt::format("{:.0f}", value);
+  const int power = static_cast<int>(std::floor(std::log10(value)));
+  return fmt::format("{:.1f}e{}", value / std::pow(10, power), power);
+}
+
+}  // namespace
+
+std::vector<UnusedPoint> unused_points(const BlockResult& result, PointRole role) {
+  std::vector<UnusedPoint> unused;
+  for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
+    const ControlPoint& given = result.block.control_points[p];
+    const BlockResult::ControlResult& control = result.control[p];
+    if (given.role != role || control.takes_part()) continue;
+    UnusedPoint point{p, {}};
+    for (std::size_t m = 0; m < std::min(given.measurements.size(), control.residual_px.size()); ++m) {
+      const double length = control.residual_px[m].norm();
+      if (std::isfinite(length)) point.marks.push_back({length, given.measurements[m].image});
+    }
+    std::ranges::stable_sort(point.marks, std::greater(), &UnusedPoint::Mark::px);
+    unused.push_back(point);
+  }
+  std::ranges::stable_sort(unused, std::greater(), &UnusedPoint::worst_px);
+  return unused;
+}
+
+std::string unused_points_text(const BlockResult& result, PointRole role) {
+  const std::vector<UnusedPoint> unused = unused_points(result, role);
+  if (unused.empty()) return "";
+  const bool one = unused.size() == 1;
+  std::string text =
+      fmt::format("{} {} {} take{} no part: ", unused.size(), role == PointRole::kCheck ? "check" : "control",
+                  one ? "point" : "points", one ? "s" : "");
+  for (std::size_t i = 0; i < std::min(kNamedInLine, unused.size()); ++i) {
+    const UnusedPoint& point = unused[i];
+    text += (i > 0 ? ", " : "") + result.block.control_points[point.point].name + " (";
+    // Marks that contradict one another may all be rejected, and the worst need not be the wrong one.
+    for (std::size_t m = 0; m < std::min(kMarks, point.marks.size()); ++m)
+      text += pixels(point.marks[m].px) + " px in " + result.block.name_of(point.marks[m].image) + ", ";
+    text += point.marks.empty() ? "not seen by an oriented image)" : "rejected)";
+  }
+  if (unused.size() > kNamedInLine) text += fmt::format(" and {} more", unused.size() - kNamedInLine);
+  return text;
+}
+
+namespace {
+
+// A control or check point, with its difference from the given position.
+struct WrongPoint {
+  const ControlPoint* point = nullptr;
+  double sigmas = 0, metres = 0, worst_px = 0;
+  bool aside = false;  // the adjustment left its position out
+};
+
+// The length of adjusted - given over the sigmas of the adjustment, on the axes that are given. A check point's own
+// covariance counts too.
+WrongPoint difference_of(const BlockResult& result, const ControlPoint& given,
+                         const BlockResult::ControlResult& control) {
+  WrongPoint wrong{&given};
+  const Eigen::Vector3d sigma = used_sigma(result, given);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double difference = control.adjusted[axis] - given.position[axis];
+    double variance = sigma[axis] * sigma[axis];
+    if (given.role == PointRole::kCheck) variance += control.covariance(axis, axis);
+    if (!std::isfinite(difference) || !std::isfinite(variance)) continue;
+    wrong.sigmas = std::hypot(wrong.sigmas, difference / std::sqrt(variance));
+    wrong.metres = std::hypot(wrong.metres, difference);
+  }
+  for (std::size_t m = 0; m < std::min(given.measurements.size(), control.residual_px.size()); ++m)
+    if (control.takes_part(m)) wrong.worst_px = std::max(wrong.worst_px, control.residual_px[m].norm());
+  return wrong;
+}
+
+std::string wrong_points_text(const BlockResult& result, PointRole role) {
+  std::vector<WrongPoint> wrong;
+  std::int64_t compared = 0, aside = 0;
+  for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
+    const ControlPoint& given = result.block.control_points[p];
+    if (given.role != role || !result.control[p].takes_part()) continue;
+    ++compared;
+    WrongPoint point = difference_of(result, given, result.control[p]);
+    point.aside = std::ranges::binary_search(result.control_aside, static_cast<std::int64_t>(p));
+    if (!point.aside && !(point.sigmas > kContradictedSigmas)) continue;
+    aside += point.aside;
+    wrong.push_back(point);
+  }
+  if (wrong.empty()) return "";
+  std::stable_sort(wrong.begin(), wrong.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
+  const bool one = wrong.size() == 1, control = role == PointRole::kControl;
+  const char* part = !control ? ""
+                     : aside == std::ssize(wrong)
+                         ? (one ? " and takes no part" : " and take no part")
+                         : (one ? " and has hardly any weight" : " and have hardly any weight");
+  std::string text =
+      fmt::format("{} of {} {} differ{} from the block by more than {:.0f} sigmas{}: ", wrong.size(), compared,
+                  control ? "control points" : "check points", one ? "s" : "", shown_limit(wrong.back().sigmas), part);
+  for (std::size_t i = 0; i < std::min(kNamedInLine, wrong.size()); ++i)
+    text += fmt::format("{}{} by {:.{}f} m (its marks fit within {} px)", i > 0 ? ", " : "", wrong[i].point->name,
+                        wrong[i].metres, wrong[i].metres < 10 ? 3 : 1, pixels(wrong[i].worst_px));
+  if (wrong.size() > kNamedInLine) text += fmt::format(" and {} more", wrong.size() - kNamedInLine);
+  return text + (one ? "; check its coordinates and its name" : "; check their coordinates and names");
+}
+
+std::string rejected_marks_text(const BlockResult& result) {
+  struct Mark {
+    std::string place;
+    double px = 0;
+  };
+  std::vector<Mark> marks;
+  for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
+    const ControlPoint& given = result.block.control_points[p];
+    const BlockResult::ControlResult& control = result.control[p];
+    if (!control.takes_part()) continue;
+    for (std::size_t m = 0; m < std::min(given.measurements.size(), control.residual_px.size()); ++m)
+      if (!control.takes_part(m) && control.residual_px[m].allFinite())
+        marks.push_back(
+            {given.name + " in " + result.block.name_of(given.measurements[m].image), control.residual_px[m].norm()});
+  }
+  if (marks.empty()) return "";
+  std::stable_sort(marks.begin(), marks.end(), [](const auto& a, const auto& b) { return a.px > b.px; });
+  std::string text = fmt::format("{} of control and check points {} rejected: ", counted(std::ssize(marks), "mark"),
+                                 marks.size() == 1 ? "is" : "are");
+  for (std::size_t i = 0; i < std::min(kNamedInLine, marks.size()); ++i)
+    text += fmt::format("{}{} by {} px", i > 0 ? ", " : "", marks[i].place, pixels(marks[i].px));
+  if (marks.size() > kNamedInLine) text += fmt::format(" and {} more", marks.size() - kNamedInLine);
+  return text;
+}
+
+}  // namespace
+
+std::vector<std::string> wrong_control_texts(const BlockResult& result) {
+  std::vector<std::string> lines;
+  for (const std::string& text : {wrong_points_text(result, PointRole::kControl),
+                                  wrong_points_text(result, PointRole::kCheck), rejected_marks_text(result)})
+    if (!text.empty()) lines.push_back(text);
+  return lines;
+}
+
+}  // namespace megablock
