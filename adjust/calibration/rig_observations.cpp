@@ -34,19 +34,21 @@ void remove_datum(Block& block) {
 }
 
 // Frees all mounts but the references, or only those that the project frees without a sigma. The sigma of the position
-// is limited by the size of the rig, so that it also holds the scale of a small rig.
+// is limited by the size of the rig, so that it also holds the scale of a small rig. A receiver is no part of the
+// calibration of a rig and stays as the project gives it.
 void free_mounts(Rig& rig, bool all, const RigCalibrationOptions& options) {
   double extent = 0;
-  for (const Mount& mount : rig.mounts)
+  for (const Mount& mount : rig.cameras())
     extent = std::max(extent, (mount.pose.centre - rig.mounts[0].pose.centre).norm());
   const double limit = extent > 0 ? extent / 2 : options.free_position_sigma_m;
-  for (std::size_t m = 1; m < rig.mounts.size(); ++m) {
+  for (std::size_t m = 1; m < rig.cameras().size(); ++m) {
     Mount& mount = rig.mounts[m];
     if (all || std::isinf(mount.position_sigma_m))
       mount.position_sigma_m = std::min(options.free_position_sigma_m, limit);
     if (all || std::isinf(mount.rotation_sigma_rad))
       mount.rotation_sigma_rad = kDegree * options.free_rotation_sigma_deg;
   }
+  if (rig.has_receiver()) rig.mounts.back().rotation_sigma_rad = rig.mounts.back().position_sigma_m = 0;
 }
 
 }  // namespace
@@ -68,7 +70,7 @@ std::string mode_name(CalibrationMode mode) {
 }
 
 Block calibration_block(Block block, const RigCalibrationOptions& options) {
-  if (std::none_of(block.rigs.begin(), block.rigs.end(), [](const Rig& rig) { return rig.mounts.size() > 1; }))
+  if (std::none_of(block.rigs.begin(), block.rigs.end(), [](const Rig& rig) { return rig.cameras().size() > 1; }))
     throw InputError(
         "the block has no rig of two or more cameras: there are no mounts to calibrate; give 'rigs' in the project "
         "file");

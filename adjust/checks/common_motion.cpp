@@ -97,7 +97,7 @@ class MotionSummation {
     // alone.
     for (const auto& term : problem_.positions) {
       const auto frame = static_cast<std::size_t>(term.frame.value);
-      const FrameResidual3 r = linearise_position(state_.frames[frame], term.prior);
+      const FrameResidual3 r = linearise_position(state_.frames[frame], prior_of(term, state_));
       frames_[frame].known += weight_of(loss_of(problem_, term), r.residual) * r.by_frame.transpose() * r.by_frame;
     }
     for (const auto& term : problem_.lines) {
@@ -117,7 +117,7 @@ class MotionSummation {
     }
     for (const auto& term : problem_.attitudes) {
       const auto frame = static_cast<std::size_t>(term.frame.value);
-      const FrameResidual3 r = linearise_attitude(state_.frames[frame], term.prior);
+      const FrameResidual3 r = linearise_attitude(state_.frames[frame], prior_of(term, state_));
       frames_[frame].attitude += weight_of(loss_of(problem_, term), r.residual) * r.by_frame.transpose() * r.by_frame;
     }
     // A control point resists the movement of the ground itself: (S_X / sigma)'(S_X / sigma) is added to M.

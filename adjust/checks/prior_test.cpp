@@ -136,7 +136,7 @@ class PriorTester {
 
   // `loss`: empty for an observation that takes no part.
   PriorTest test(const TileProblem::PositionTerm& term, const std::optional<RobustLoss>& loss) const {
-    const FrameResidual3 r = linearise_position(state_.frames[row(term)], term.prior);
+    const FrameResidual3 r = linearise_position(state_.frames[row(term)], prior_of(term, state_));
     return test(r.residual, r.by_frame * frames_[row(term)] * r.by_frame.transpose(), loss);
   }
   PriorTest test(const TileProblem::PointTerm& term, const std::optional<RobustLoss>& loss) const {

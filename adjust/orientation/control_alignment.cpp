@@ -59,7 +59,7 @@ class ControlAligner {
   ControlAligner(const Block& block, const BlockState& state, const std::vector<FrameIndex>& frames)
       : block_(block), state_(state), frames_(frames) {
     for (const FrameIndex frame : frames_)
-      for (const Mount& mount : block.rig_of(frame).mounts) metric_ = metric_ || mount.pose.centre.norm() > 0;
+      for (const Mount& mount : block.rig_of(frame).cameras()) metric_ = metric_ || mount.pose.centre.norm() > 0;
     for (const ControlPoint& point : block.control_points) see(point);
   }
 
@@ -264,9 +264,10 @@ class ControlAligner {
     double count = 0;
     for (const FrameIndex frame : frames_) {
       if (!state_.oriented[frame]) continue;
-      for (const Pose& mount : state_.mounts[block_.frames[frame].rig]) {
+      const RigIndex rig = block_.frames[frame].rig;
+      for (std::size_t m = 0; m < block_.rigs[rig].cameras().size(); ++m) {
         const Eigen::Quaterniond turn =
-            similarity.rotation * camera_pose(state_.frames[frame], mount).rotation.conjugate();
+            similarity.rotation * camera_pose(state_.frames[frame], state_.mounts[rig][m]).rotation.conjugate();
         axes.view += turn * Eigen::Vector3d::UnitZ();
         axes.down += turn * Eigen::Vector3d::UnitY();
         ++count;

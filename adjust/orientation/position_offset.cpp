@@ -9,7 +9,7 @@
 #include "adjust/orientation/steps/control_marks.h"
 #include "geometry/numbers/median.h"
 #include "io/block/held_priors.h"
-#include "io/block/prior_differences.h"
+#include "io/block/observed_poses.h"
 
 namespace megablock {
 
@@ -149,7 +149,9 @@ PositionOffset adjusted_offset(const MovedPositions& moved, const Block& block, 
   std::array<std::vector<double>, 3> differences, own;  // given minus adjusted; variances
   for (const FrameIndex frame : moved.frames) {
     if (!has_position(block, adjusted, frame)) continue;
-    const Eigen::Vector3d d = difference(adjusted.frames[frame], *block.frames[frame].position_prior);
+    const RigIndex rig = block.frames[frame].rig;
+    const Eigen::Vector3d d = difference(
+        adjusted.frames[frame], corrected(*block.frames[frame].position_prior, block.rigs[rig], adjusted.mounts[rig]));
     for (std::size_t k = 0; k < 3; ++k) {
       differences[k].push_back(-d[static_cast<int>(k)]);
       own[k].push_back(variances[frame][static_cast<int>(k)]);

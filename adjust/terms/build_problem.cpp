@@ -42,6 +42,10 @@ std::int32_t row_of(const std::vector<Value>& table, const Value& value) {
   return it == table.end() || *it != value ? -1 : static_cast<std::int32_t>(it - table.begin());
 }
 
+MountId receiver_id(const Block& block, RigIndex rig) {
+  return {rig, static_cast<std::int32_t>(block.rigs[rig].mounts.size()) - 1};
+}
+
 class TileBuilder {
  public:
   TileBuilder(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile, const TrackSet& owned,
@@ -89,6 +93,13 @@ class TileBuilder {
   }
   MountId mount_of(ImageIndex image) const {
     return {block_.frames[block_.images[image].frame].rig, block_.images[image].mount};
+  }
+  // The receiver of the rig of a frame with a prior in this tile; mount -1: none.
+  MountId receiver_of(FrameIndex frame) const {
+    const RigIndex rig = block_.frames[frame].rig;
+    const bool any =
+        block_.rigs[rig].has_receiver() && has_prior(block_.frames[frame]) && tiles_.tile_of_frame[frame] == tile_;
+    return any ? receiver_id(block_, rig) : MountId{rig, -1};
   }
   const FrameMeasurement& measured(const std::string& key, std::size_t row) const {
     return block_.frame_measurements.at(key)[row];
@@ -143,6 +154,8 @@ class TileBuilder {
       if (line.other.valid()) frames.push_back(line.other);
     }
     make_distinct(frames);
+    for (const FrameIndex frame : frames)
+      if (const MountId receiver = receiver_of(frame); receiver.mount >= 0) problem_.mounts.push_back(receiver);
     make_distinct(problem_.cameras);
     make_distinct(problem_.mounts);
 
@@ -232,10 +245,12 @@ class TileBuilder {
       if (tiles_.tile_of_frame[problem_.frames[f]] != tile_) continue;
       const Frame& frame = block_.frames[problem_.frames[f]];
       const LocalFrame local(static_cast<std::int32_t>(f));
+      const MountId id = receiver_of(problem_.frames[f]);
+      const std::int32_t receiver = id.mount < 0 ? -1 : row_of(problem_.mounts, id);
       if (options_.use_position_priors && frame.position_prior)
-        problem_.positions.push_back({local, *frame.position_prior});
+        problem_.positions.push_back({local, *frame.position_prior, receiver});
       if (options_.use_attitude_priors && frame.attitude_prior)
-        problem_.attitudes.push_back({local, *frame.attitude_prior});
+        problem_.attitudes.push_back({local, *frame.attitude_prior, receiver});
     }
   }
 
@@ -337,15 +352,16 @@ TileProblem make_tile_problem(const Block& block, const BlockState& state, const
 
 namespace {
 
-// The priors of a camera and of a mount belong to the tile of the first oriented image that uses it.
+// The priors of a camera and of its mount belong to the tile of the first oriented image that uses it, those of a
+// receiver to the tile of the first oriented frame with a position or an attitude.
 void find_first_users(const Block& block, const BlockState& state, const Tiles& tiles, RowsOfTiles& rows) {
   IndexedVector<CameraIndex, std::uint8_t> camera_seen(block.cameras.size(), 0);
   std::vector<std::vector<std::uint8_t>> mount_seen;
   // The search ends as soon as every camera and mount has its tile. In a large block of few cameras that is soon.
   std::size_t open = block.cameras.size();
   for (const Rig& rig : block.rigs) {
-    mount_seen.emplace_back(rig.mounts.size(), 0);
-    open += rig.mounts.size();
+    mount_seen.emplace_back(rig.cameras().size(), 0);
+    open += rig.cameras().size();
   }
   for (ImageIndex image(0); block.images.contains(image) && open > 0; ++image.value) {
     const FrameIndex frame = block.images[image].frame;
@@ -376,11 +392,16 @@ void find_first_users(const Block& block, const BlockState& state, const Tiles& 
 RowsOfTiles rows_of_tiles(const Block& block, const BlockState& state, const Tiles& tiles) {
   check_sizes(block, state, tiles);
   RowsOfTiles rows(static_cast<std::size_t>(tiles.tile_count));
+  IndexedVector<RigIndex, std::uint8_t> receiver_seen(block.rigs.size(), 0);
   for (FrameIndex frame(0); block.frames.contains(frame); ++frame.value) {
     const TileIndex tile = tiles.tile_of_frame[frame];
     const bool prior = block.frames[frame].position_prior || block.frames[frame].attitude_prior;
-    if (tile.valid() && state.oriented[frame] && prior)
-      rows[static_cast<std::size_t>(tile.value)].frames.push_back(frame);
+    if (!tile.valid() || !state.oriented[frame] || !prior) continue;
+    rows[static_cast<std::size_t>(tile.value)].frames.push_back(frame);
+    const RigIndex rig = block.frames[frame].rig;
+    if (!block.rigs[rig].has_receiver() || receiver_seen[rig]) continue;
+    receiver_seen[rig] = 1;
+    rows[static_cast<std::size_t>(tile.value)].mounts.push_back(receiver_id(block, rig));
   }
   for (std::size_t row = 0; row < block.relative_poses.size(); ++row) {
     const RelativePose& relative = block.relative_poses[row];

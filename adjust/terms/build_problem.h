@@ -12,10 +12,10 @@ namespace megablock {
 
 // Builds the problem of a tile: all rows of `owned` (the track file of the tile) whose images belong to oriented
 // frames, and the control points, priors and relative poses that the tile owns. The priors of a frame belong to the
-// tile of the frame, the prior of a camera to the tile of the first oriented image that uses it, and a relative pose to
-// the tile that would own a track of its two frames. Every observation starts as kept. Observations of images without
-// pose are not kept, but their rows stay, so that rows correspond to the track file. The image observations of control
-// points follow them.
+// tile of the frame, the prior of a camera to the tile of the first oriented image that uses it, that of a receiver to
+// the tile of the first oriented frame that it observes, and a relative pose to the tile that would own a track of its
+// two frames. Every observation starts as kept. Observations of images without pose are not kept, but their rows stay,
+// so that rows correspond to the track file. The image observations of control points follow them.
 TileProblem make_tile_problem(const Block& block, const BlockState& state, const Tiles& tiles, TileIndex tile,
                               const TrackSet& owned, const ObservationOptions& options);
 
@@ -28,7 +28,7 @@ struct RowsOfTile {
   std::map<std::string, std::vector<std::size_t>> measured;
   std::vector<std::size_t> verticals;  // of oriented images, ascending
   std::vector<CameraIndex> cameras;    // cameras whose first oriented image lies in the tile, ascending
-  std::vector<MountId> mounts;         // mounts, in the same way
+  std::vector<MountId> mounts;         // mounts and receivers, in the same way
 };
 using RowsOfTiles = std::vector<RowsOfTile>;  // [tiles]
 RowsOfTiles rows_of_tiles(const Block& block, const BlockState& state, const Tiles& tiles);

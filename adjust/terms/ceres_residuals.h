@@ -121,24 +121,40 @@ struct ImageMeasured {
   }
 };
 
-// r = (C + R' l - P) / sigma.
+// r = (C + R' l - P) / sigma, and with a receiver at c r = (C + R' (l + c) - P) / sigma.
 struct PositionMeasured {
   PositionPrior prior;
   template <typename Scalar>
   bool operator()(const Scalar* frame, Scalar* result) const {
-    const Vector3<Scalar> arm = rotation_of(frame).conjugate() * prior.lever_arm.cast<Scalar>();
+    return differ<Scalar>(frame, prior.lever_arm.cast<Scalar>(), result);
+  }
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, const Scalar* receiver, Scalar* result) const {
+    return differ<Scalar>(frame, prior.lever_arm.cast<Scalar>() + centre_of(receiver), result);
+  }
+  template <typename Scalar>
+  bool differ(const Scalar* frame, const Vector3<Scalar>& in_rig, Scalar* result) const {
+    const Vector3<Scalar> arm = rotation_of(frame).conjugate() * in_rig;
     for (int i = 0; i < 3; ++i) result[i] = (frame[4 + i] - prior.position[i] + arm[i]) / prior.sigma[i];
     return true;
   }
 };
 
-// r = Log(R R_0') / sigma.
+// r = Log(R R_0') / sigma, and with a receiver of the rotation R_m r = Log(R (R_m' R_0)') / sigma.
 struct AttitudeMeasured {
   AttitudePrior prior;
   template <typename Scalar>
   bool operator()(const Scalar* frame, Scalar* result) const {
-    const Eigen::Quaternion<Scalar> reference = prior.rotation_cw.cast<Scalar>();
-    const Vector3<Scalar> w = rotation_log<Scalar>(rotation_of(frame) * reference.conjugate());
+    return differ<Scalar>(rotation_of(frame) * prior.rotation_cw.cast<Scalar>().conjugate(), result);
+  }
+  template <typename Scalar>
+  bool operator()(const Scalar* frame, const Scalar* receiver, Scalar* result) const {
+    return differ<Scalar>(rotation_of(frame) * prior.rotation_cw.cast<Scalar>().conjugate() * rotation_of(receiver),
+                          result);
+  }
+  template <typename Scalar>
+  bool differ(const Eigen::Quaternion<Scalar>& difference, Scalar* result) const {
+    const Vector3<Scalar> w = rotation_log<Scalar>(difference);
     for (int i = 0; i < 3; ++i) result[i] = w[i] / prior.sigma_rad[i];
     return true;
   }

@@ -104,6 +104,9 @@ struct FrameResidual3 {
 // and attitude_terms.cpp.
 FrameResidual3 linearise_position(const Pose& frame, const PositionPrior& prior);
 FrameResidual3 linearise_attitude(const Pose& frame, const AttitudePrior& prior);
+// The prior of a term as the receiver corrects it (io/block/observed_poses.h).
+PositionPrior prior_of(const TileProblem::PositionTerm& term, const TileState& state);
+AttitudePrior prior_of(const TileProblem::AttitudeTerm& term, const TileState& state);
 
 struct RelativeResidual {
   Eigen::Matrix<double, 6, 1> residual;

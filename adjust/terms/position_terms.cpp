@@ -1,13 +1,14 @@
 // Defines the terms for positions of frames, as GNSS observes them: r = (C + R' l - P) / sigma, with l the lever arm in
-// the axes of the rig, metres.
+// the axes of the rig, metres. A receiver in the block adds its centre c to l (io/block/observed_poses.h).
 //
-//   C + R' l:   by w: [R' l]x (as Exp(-w) R' l),   by d: I
+//   C + R' l:   by w: [R' l]x (as Exp(-w) R' l),   by d: I,   by c: R'
 //
 // The tile of the frame owns them. A held position (io/block/held_priors.h) has no loss, which would release it.
 #include "adjust/terms/automatic_terms.h"
 #include "adjust/terms/linearise.h"
 #include "adjust/terms/prior_loss.h"
 #include "adjust/terms/terms.h"
+#include "io/block/observed_poses.h"
 
 namespace megablock {
 
@@ -20,6 +21,10 @@ FrameResidual3 linearise_position(const Pose& frame, const PositionPrior& prior)
   return result;
 }
 
+PositionPrior prior_of(const TileProblem::PositionTerm& term, const TileState& state) {
+  return term.receiver < 0 ? term.prior : corrected(term.prior, state.mounts[static_cast<std::size_t>(term.receiver)]);
+}
+
 namespace {
 
 class Positions final : public ObservationType {
@@ -28,16 +33,25 @@ class Positions final : public ObservationType {
  public:
   std::size_t count(const TileProblem& problem) const override { return problem.positions.size(); }
   TermUnknowns unknowns(const TileProblem& problem, std::size_t row) const override {
-    return {{problem.positions[row].frame.value}, 1};
+    TermUnknowns unknowns{{problem.positions[row].frame.value}, 1};
+    unknowns.mount = problem.positions[row].receiver;
+    return unknowns;
   }
   void linearise(const TileProblem& problem, const TileState& state, std::size_t row,
                  const TermVisit& visit) const override {
     const TileProblem::PositionTerm& term = problem.positions[row];
-    const FrameResidual3 r = linearise_position(state.frames[term.frame.value], term.prior);
+    const Pose& frame = state.frames[term.frame.value];
+    const FrameResidual3 r = linearise_position(frame, prior_of(term, state));
     LinearTerm out;
     out.set_residual(r.residual);
     out.kinds = {kPositionHorizontal, kPositionHorizontal, kPositionHeight};
     out.add_block(LinearTerm::By::kFrame, term.frame.value, r.by_frame);
+    if (term.receiver >= 0) {
+      Eigen::Matrix<double, 3, 6> by_receiver = Eigen::Matrix<double, 3, 6>::Zero();
+      by_receiver.rightCols<3>() =
+          term.prior.sigma.cwiseInverse().asDiagonal() * frame.rotation.conjugate().toRotationMatrix();
+      out.add_block(LinearTerm::By::kMount, term.receiver, by_receiver);
+    }
     out.loss = loss_of(problem, term);
     visit(out);
   }
@@ -47,7 +61,7 @@ class Positions final : public ObservationType {
     datum.frame = term.frame.value;
     // A held position has a sigma of nanometres. With its own weight it would make every other information about the
     // datum look like nothing (comparable() in io/block/held_priors.h).
-    datum.by_frame = linearise_position(state.frames[term.frame.value], comparable(term.prior)).by_frame;
+    datum.by_frame = linearise_position(state.frames[term.frame.value], comparable(prior_of(term, state))).by_frame;
     datum.holds_place = held(term.prior);
     return datum;
   }
@@ -64,7 +78,10 @@ class Positions final : public ObservationType {
           term.prior.sigma.array() *= Eigen::Array3d(horizontal, horizontal, scales[kPositionHeight]);
   }
   ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const override {
-    return automatic_term<3, kPoseBlock>(residual::PositionMeasured{problem.positions[row].prior});
+    const TileProblem::PositionTerm& term = problem.positions[row];
+    const residual::PositionMeasured measured{term.prior};
+    if (term.receiver < 0) return automatic_term<3, kPoseBlock>(measured);
+    return automatic_term<3, kPoseBlock, kPoseBlock>(measured);
   }
 };
 

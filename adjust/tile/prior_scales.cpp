@@ -57,8 +57,8 @@ PriorLengths prior_lengths(const TileProblem& problem, const TileState& state) {
   for (const auto& term : problem.positions) {
     if (held(term.prior)) continue;
     const Pose& frame = state.frames[static_cast<std::size_t>(term.frame.value)];
-    add_residual(linearise_position(frame, term.prior).residual, term.prior.sigma, lengths.position_horizontal,
-                 lengths.position_height);
+    add_residual(linearise_position(frame, prior_of(term, state)).residual, term.prior.sigma,
+                 lengths.position_horizontal, lengths.position_height);
   }
   for (const auto& term : problem.point_priors) {
     if (held(term) || !problem.active(term.point.value)) continue;

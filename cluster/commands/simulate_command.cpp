@@ -204,6 +204,10 @@ void add_prior_options(SimulateOptions& s) {
         kStereopolis);
   s.add("--attitude-sigma", &O::attitude_sigma_deg,
         "Tie points: attitude priors, degrees; 0 = none [0; stereopolis 0.03]", kTiePoints);
+  s.add("--lever-arm-error", &O::lever_arm_error_m,
+        "All but stereopolis: distance of the antenna from its stated lever arm, m [0]", kNoTrajectory);
+  s.add("--boresight-error", &O::boresight_error_deg,
+        "Tie points: angle by which the attitudes are turned against the rig, degrees [0]", kTiePoints);
   s.add("--relative-position-sigma", &O::relative_position_sigma_m,
         "Relative poses, m; 0 = none [0; stereopolis 0.005]");
   s.add("--relative-rotation-sigma", &O::relative_rotation_sigma_deg, "Relative poses, degrees [0.01]");

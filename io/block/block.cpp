@@ -122,15 +122,20 @@ void check(const Block& block) {
       require(sigma >= 0, "camera '" + camera.name + "': a prior sigma is negative or not a number");
   }
   for (const Rig& rig : block.rigs) {
-    require(!rig.mounts.empty(), "rig '" + rig.name + "': has no camera");
+    require(!rig.cameras().empty(), "rig '" + rig.name + "': has no camera");
     require(rig.mounts.front().held(), "rig '" + rig.name + "': its first mount is the reference and must be held");
-    for (const Mount& mount : rig.mounts) {
+    for (const Mount& mount : rig.cameras()) {
       require(block.cameras.contains(mount.camera),
               "rig '" + rig.name + "': a mount refers to a camera that the block does not have");
       check_unit(mount.pose, "rig '" + rig.name + "'");
       require(mount.held() || (mount.rotation_sigma_rad > 0 && mount.position_sigma_m > 0),
               "rig '" + rig.name + "': the sigmas of a mount must be both positive, or both 0 to hold it");
     }
+    if (!rig.has_receiver()) continue;
+    const Mount& receiver = rig.mounts.back();
+    check_unit(receiver.pose, "receiver of rig '" + rig.name + "'");
+    require(receiver.rotation_sigma_rad >= 0 && receiver.position_sigma_m >= 0,
+            "rig '" + rig.name + "': the sigmas of a receiver must be at least 0");
   }
   for (const Frame& frame : block.frames) {
     require(block.rigs.contains(frame.rig), "frame '" + frame.name + "': refers to a rig that the block does not have");
@@ -148,7 +153,7 @@ void check(const Block& block) {
     const Image& image = block.images[i];
     require(block.frames.contains(image.frame),
             "image '" + block.name_of(i) + "': refers to a frame that the block does not have");
-    require(image.mount >= 0 && image.mount < static_cast<int>(block.rig_of(image.frame).mounts.size()),
+    require(image.mount >= 0 && image.mount < std::ssize(block.rig_of(image.frame).cameras()),
             "image '" + block.name_of(i) + "': its rig has no such mount");
   }
   for (const RelativePose& relative : block.relative_poses) {

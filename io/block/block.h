@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -50,18 +51,20 @@ inline constexpr double kLongestReadoutS = 1;  // of Camera::readout_s
 
 // Pose of a camera in its rig. A single camera is a rig of one camera with the identity as its mount, held fixed.
 struct Mount {
-  CameraIndex camera;
-  Pose pose;  // X_cam = R_mount (X_rig - C_mount)
+  CameraIndex camera;  // invalid: the receiver of the rig (observed_poses.h)
+  Pose pose;           // X_cam = R_mount (X_rig - C_mount)
   // Prior standard deviations; 0 = held fixed. The first mount of a rig is its reference and always held.
   double rotation_sigma_rad = 0;
   double position_sigma_m = 0;
   bool held() const { return rotation_sigma_rad == 0 && position_sigma_m == 0; }
 };
 
-// Cameras that are fixed to each other.
+// Cameras that are fixed to each other, and the receiver that observes their positions and attitudes.
 struct Rig {
   std::string name;
-  std::vector<Mount> mounts;
+  std::vector<Mount> mounts;  // of the cameras, then of the receiver, where it is no part of the priors
+  bool has_receiver() const { return !mounts.empty() && !mounts.back().camera.valid(); }
+  std::span<const Mount> cameras() const { return {mounts.data(), mounts.size() - (has_receiver() ? 1 : 0)}; }
 };
 
 // Position of the GNSS antenna in the ground frame.

@@ -92,7 +92,7 @@ double expected_rms_px(const RigCalibration& calibration, double sigma_px) {
 }
 
 std::string mount_name(const Block& block, RigIndex rig, std::int32_t mount) {
-  const std::vector<Mount>& mounts = block.rigs[rig].mounts;
+  const std::span<const Mount> mounts = block.rigs[rig].cameras();
   const CameraIndex camera = mounts[static_cast<std::size_t>(mount)].camera;
   const auto carried =
       std::count_if(mounts.begin(), mounts.end(), [&](const Mount& other) { return other.camera == camera; });
@@ -124,7 +124,7 @@ void apply_calibration(const RigCalibration& calibration, bool hold, Block& bloc
       camera.choose = false;  // the calibration says how well each parameter is known
     }
   for (RigIndex rig(0); block.rigs.contains(rig); ++rig.value)
-    for (std::size_t m = 0; m < block.rigs[rig].mounts.size(); ++m) {
+    for (std::size_t m = 0; m < block.rigs[rig].cameras().size(); ++m) {
       const std::string name = mount_name(block, rig, static_cast<std::int32_t>(m));
       const auto from = std::find_if(calibration.mounts.begin(), calibration.mounts.end(),
                                      [&](const MountCalibration& other) { return other.name == name; });

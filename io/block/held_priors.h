@@ -7,6 +7,7 @@
 #pragma once
 
 #include "io/block/block.h"
+#include "io/block/observed_poses.h"
 
 namespace megablock {
 
@@ -39,9 +40,13 @@ inline void place_held_frames(const Block& block, BlockState& state) {
     const Frame& frame = block.frames[f];
     if (!state.oriented[f]) continue;
     Pose& pose = state.frames[f];
-    if (frame.attitude_prior && held(*frame.attitude_prior)) pose.rotation = frame.attitude_prior->rotation_cw;
+    const Rig& rig = block.rigs[frame.rig];
+    const std::vector<Pose>& mounts = state.mounts[frame.rig];
+    if (frame.attitude_prior && held(*frame.attitude_prior))
+      pose.rotation = corrected(*frame.attitude_prior, rig, mounts).rotation_cw;
     if (frame.position_prior && held(*frame.position_prior))
-      pose.centre = frame.position_prior->position - pose.rotation.conjugate() * frame.position_prior->lever_arm;
+      pose.centre = frame.position_prior->position -
+                    pose.rotation.conjugate() * corrected(*frame.position_prior, rig, mounts).lever_arm;
   }
 }
 

@@ -11,7 +11,7 @@
 #include <set>
 
 #include "geometry/numbers/angles.h"
-#include "io/block/prior_differences.h"
+#include "io/block/observed_poses.h"
 #include "io/evaluation/parts.h"
 #include "io/evaluation/reliability.h"
 #include "io/evaluation/used_sigmas.h"
@@ -461,10 +461,12 @@ void find_prior_residuals(const BlockResult& result, Figures& figures) {
     if (!result.state.oriented[f]) continue;
     const Pose& pose = result.state.frames[f];
     const Frame& frame = result.block.frames[f];
+    const Rig& rig = result.block.rigs[frame.rig];
+    const std::vector<Pose>& mounts = result.state.mounts[frame.rig];
     if (const auto& prior = frame.position_prior)
-      figures.positions.push_back({f, difference(pose, *prior), used_sigma(result, *prior)});
+      figures.positions.push_back({f, difference(pose, corrected(*prior, rig, mounts)), used_sigma(result, *prior)});
     if (const auto& prior = frame.attitude_prior)
-      figures.attitudes.push_back({f, difference(pose, *prior), prior->sigma_rad});
+      figures.attitudes.push_back({f, difference(pose, corrected(*prior, rig, mounts)), prior->sigma_rad});
   }
 }
 

@@ -13,6 +13,7 @@
 #include "io/evaluation/figures.h"
 #include "io/evaluation/parts.h"
 #include "io/evaluation/position_groups.h"
+#include "io/evaluation/receivers.h"
 #include "io/evaluation/used_sigmas.h"
 #include "io/result/result_option.h"
 #include "io/text/counted.h"
@@ -351,6 +352,7 @@ std::vector<std::string> remarks(const BlockResult& result, const report::Figure
   for (std::string& text : contradicted_texts(result, figures)) lines.push_back(std::move(text));
   if (std::string text = position_groups_text(result, figures.positions); !text.empty())
     lines.push_back(std::move(text));
+  for (std::string& text : receiver_remarks(result, figures)) lines.push_back(std::move(text));
   if (std::string text = near_limit_text(result, figures); !text.empty()) lines.push_back(std::move(text));
   for (std::string& text : wrong_control_texts(result)) lines.push_back(std::move(text));
   for (const PointRole role : {PointRole::kControl, PointRole::kCheck})

@@ -145,7 +145,8 @@ Block append_to(const Block& previous, Block moved, const std::function<void()>&
     merged.cameras[cameras.Base::operator[](i)] = moved.cameras.Base::operator[](i);
   for (std::size_t i = 0; i < rigs.size(); ++i) {
     Rig rig = moved.rigs.Base::operator[](i);
-    for (Mount& mount : rig.mounts) mount.camera = cameras[mount.camera];
+    for (Mount& mount : rig.mounts)
+      if (mount.camera.valid()) mount.camera = cameras[mount.camera];
     merged.rigs[rigs.Base::operator[](i)] = std::move(rig);
   }
   for (std::size_t i = 0; i < frames.size(); ++i) {

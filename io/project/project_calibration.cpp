@@ -83,7 +83,7 @@ void read_calibrated_mounts(YamlReader& top, const Block& block, RigCalibration&
   if (!section) return;
   std::vector<std::string> known;
   for (RigIndex rig(0); block.rigs.contains(rig); ++rig.value)
-    for (std::size_t m = 0; m < block.rigs[rig].mounts.size(); ++m)
+    for (std::size_t m = 0; m < block.rigs[rig].cameras().size(); ++m)
       known.push_back(mount_name(block, rig, static_cast<std::int32_t>(m)));
   const std::vector<std::string> given = section->keys();
   for (const std::string& name : given) {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "geometry/numbers/median.h"
-#include "io/block/prior_differences.h"
+#include "io/block/observed_poses.h"
 #include "io/project/project_sections.h"
 
 namespace megablock {
@@ -74,7 +74,7 @@ void warn_of_unknown_motion(Project& project) {
   const Block& block = project.block;
   IndexedVector<CameraIndex, std::uint8_t> timed(block.cameras.size(), std::uint8_t{0});
   for (const Frame& frame : block.frames)
-    for (const Mount& mount : block.rigs[frame.rig].mounts)
+    for (const Mount& mount : block.rigs[frame.rig].cameras())
       if (std::isfinite(frame.time_s)) timed[mount.camera] = 1;
   for (CameraIndex c(0); block.cameras.contains(c); ++c.value) {
     const Camera& camera = block.cameras[c];

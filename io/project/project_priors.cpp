@@ -10,6 +10,9 @@
 //
 //     R = R_m' R_own own_from_block,    in the axes of the ground frame.
 //
+// A lever arm or boresight with a sigma, or a boresight that is not zero, gives the rig a receiver
+// (io/block/observed_poses.h).
+//
 // A kilometre from the origin the verticals differ by half a minute of arc, so this matters for large blocks.
 #include <fmt/core.h>
 
@@ -17,6 +20,7 @@
 #include <cmath>
 
 #include "geometry/numbers/angles.h"
+#include "geometry/transform/rotation.h"
 #include "io/base/error.h"
 #include "io/block/crs.h"
 #include "io/block/held_priors.h"
@@ -35,6 +39,14 @@ struct GpsOptions {
   bool given = false, use = true;  // given: the project file has this section
   std::optional<double> sigma_horizontal, sigma_vertical;
   Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();
+  double lever_arm_sigma = 0;  // metres; 0: the lever arm is held
+};
+
+struct AttitudeOptions {
+  bool given = false, use = true;
+  std::optional<double> sigma_deg;
+  Eigen::Vector3d boresight = Eigen::Vector3d::Zero();  // rotation vector, radians
+  double boresight_sigma = 0;                           // radians; 0: held
 };
 
 // Reads a sigma. The value 0 means that the observed value is held; it is replaced by `held`.
@@ -44,6 +56,14 @@ std::optional<double> read_sigma(YamlReader& reader, const std::string& key, con
   if (*sigma == 0) return held;
   check_within(*sigma, limits, key, reader.where(key), ", or be 0 to hold the observed value");
   return sigma;
+}
+
+// Reads the sigma of a lever arm or boresight; 0 holds it.
+double read_receiver_sigma(YamlReader& reader, const std::string& key, const Limits& limits) {
+  const auto sigma = reader.number(key);
+  if (!sigma || *sigma == 0) return 0;
+  check_within(*sigma, limits, key, reader.where(key), ", or be 0 to hold the given value");
+  return *sigma;
 }
 
 GpsOptions read_gps_options(YamlReader& top, bool from_images) {
@@ -60,8 +80,35 @@ GpsOptions read_gps_options(YamlReader& top, bool from_images) {
     options.lever_arm = {(*arm)[0], (*arm)[1], (*arm)[2]};
     check_on_vehicle(options.lever_arm, "gps.lever_arm_m", reader->where("lever_arm_m"));
   }
+  options.lever_arm_sigma = read_receiver_sigma(*reader, "lever_arm_sigma_m", kSigmaMetres);
   reader->finish();
   return options;
+}
+
+AttitudeOptions read_attitude_options(YamlReader& top) {
+  AttitudeOptions options;
+  auto reader = top.mapping("attitude");
+  if (!reader) return options;
+  options.given = true;
+  options.use = reader->flag("use").value_or(true);
+  options.sigma_deg = read_sigma(*reader, "sigma_deg", kSigmaDegrees, kHeldAttitudeSigma * kDegreesPerRadian);
+  if (const auto turn = reader->numbers("boresight_deg", 3)) {
+    options.boresight = kDegree * Eigen::Vector3d((*turn)[0], (*turn)[1], (*turn)[2]);
+    check_rotation_vector(options.boresight, "attitude.boresight_deg", reader->where("boresight_deg"));
+  }
+  options.boresight_sigma = kDegree * read_receiver_sigma(*reader, "boresight_sigma_deg", kSigmaDegrees);
+  reader->finish();
+  return options;
+}
+
+// Calls set(receiver) for each rig of which a frame has a prior, and gives it a receiver first where it has none.
+void set_receivers(Block& block, const auto& has_prior, const auto& set) {
+  for (const Frame& frame : block.frames) {
+    Rig& rig = block.rigs[frame.rig];
+    if (!has_prior(frame)) continue;
+    if (!rig.has_receiver()) rig.mounts.push_back({});
+    set(rig.mounts.back());
+  }
 }
 
 // The sigmas of a position: those of the project file, else the accuracy in the image header, else the defaults. A DOP
@@ -200,7 +247,11 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, b
     block.ground = ground_at(one ? known_height(known[0]) : rounded_median(known));
   else if (!others.empty() && !block.ground.georeferenced)
     block.ground = ground_at(rounded_median(others));
-  if (!from_images) return;
+  const auto free_lever_arms = [&] {
+    if (options.lever_arm_sigma > 0)
+      set_receivers(block, has_position, [&](Mount& receiver) { receiver.position_sigma_m = options.lever_arm_sigma; });
+  };
+  if (!from_images) return free_lever_arms();
   if (!known.empty() && !block.ground.georeferenced)
     project.warnings.push_back(
         "GPS positions are not used, because the block of this job is not georeferenced; start a new job to use them");
@@ -209,39 +260,41 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, b
     project.warnings.push_back(text_of_one_position(known, scanned.size()));
   }
   const auto sigmas = set_position_priors(scanned, positions, options, block);
+  free_lever_arms();
   project.found = lines_of_positions(scanned, sigmas);
 }
 
 void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, Project& project) {
   const bool from_images = !scanned.empty();
-  bool given = false, use = true;
-  std::optional<double> sigma_deg;
-  if (auto reader = top.mapping("attitude")) {
-    given = true;
-    use = reader->flag("use").value_or(true);
-    sigma_deg = read_sigma(*reader, "sigma_deg", kSigmaDegrees, kHeldAttitudeSigma * kDegreesPerRadian);
-    reader->finish();
-  }
+  const AttitudeOptions options = read_attitude_options(top);
   Block& block = project.block;
-  if (given && use) {
+  if (options.given && options.use) {
     const auto tells = [](const ScannedImage& image) { return image.header.attitude || image.local_attitude; };
     const bool has_effect =
         from_images ? std::ranges::any_of(scanned, tells) : std::ranges::any_of(block.frames, has_attitude);
     check_effect(top, "attitude", "attitudes", from_images, has_effect, project.warnings);
   }
-  if (!use)
+  if (!options.use)
     for (Frame& frame : block.frames) frame.attitude_prior.reset();
   for (Frame& frame : block.frames)
-    if (frame.attitude_prior && sigma_deg) frame.attitude_prior->sigma_rad.setConstant(*sigma_deg * kDegree);
-  if (!from_images) return;
+    if (frame.attitude_prior && options.sigma_deg)
+      frame.attitude_prior->sigma_rad.setConstant(*options.sigma_deg * kDegree);
+  const auto set_boresights = [&] {
+    if (options.boresight.isZero() && options.boresight_sigma == 0) return;
+    set_receivers(block, has_attitude, [&](Mount& receiver) {
+      receiver.pose.rotation = rotation_exp<double>(options.boresight);
+      receiver.rotation_sigma_rad = options.boresight_sigma;
+    });
+  };
+  if (!from_images) return set_boresights();
   std::optional<Georeference> georeference;
   if (block.ground.georeferenced) georeference.emplace(block.ground);
   std::vector<bool> used(scanned.size(), false);
-  const double tilt = sigma_deg.value_or(kTiltSigmaDeg) * kDegree;
-  const double yaw = sigma_deg.value_or(kYawSigmaDeg) * kDegree;
+  const double tilt = options.sigma_deg.value_or(kTiltSigmaDeg) * kDegree;
+  const double yaw = options.sigma_deg.value_or(kYawSigmaDeg) * kDegree;
   for (std::size_t i = 0; i < scanned.size(); ++i) {
     const auto& local = scanned[i].local_attitude;
-    if (!use || (!local && (!scanned[i].header.attitude || !georeference))) continue;
+    if (!options.use || (!local && (!scanned[i].header.attitude || !georeference))) continue;
     used[i] = true;
     const ImageIndex image(static_cast<std::int64_t>(i));
     Frame& frame = block.frames[block.images[image].frame];
@@ -261,6 +314,7 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
     prior.sigma_rad = (r * variance.asDiagonal() * r.transpose()).diagonal().cwiseSqrt();
     frame.attitude_prior = prior;
   }
+  set_boresights();
   const auto lines = lines_of_attitudes(scanned, used, tilt * kDegreesPerRadian, yaw * kDegreesPerRadian);
   project.found.insert(project.found.end(), lines.begin(), lines.end());
 }

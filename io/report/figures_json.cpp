@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/evaluation/control_remarks.h"
+#include "io/evaluation/receivers.h"
 #include "io/report/sections/sections.h"
 
 namespace megablock::report {
@@ -78,8 +79,8 @@ OrderedJson mounts(const BlockResult& result) {
   OrderedJson list = OrderedJson::array();
   for (RigIndex r(0); result.block.rigs.contains(r) && result.state.mounts.contains(r); ++r.value) {
     const Rig& rig = result.block.rigs[r];
-    if (rig.mounts.size() < 2) continue;
-    for (std::size_t m = 0; m < rig.mounts.size(); ++m) {
+    if (rig.cameras().size() < 2) continue;
+    for (std::size_t m = 0; m < rig.cameras().size(); ++m) {
       const Pose& pose = result.state.mounts[r][m];
       const Eigen::Quaterniond& q = pose.rotation;
       PoseIncrement sigma = PoseIncrement::Constant(kUnknown);
@@ -93,6 +94,17 @@ OrderedJson mounts(const BlockResult& result) {
                       {"sigma_rotation_rad", vector(sigma.head<3>())}});
     }
   }
+  return list;
+}
+
+OrderedJson receivers(const BlockResult& result) {
+  OrderedJson list = OrderedJson::array();
+  for (const ReceiverFigures& receiver : receivers_of(result))
+    list.push_back({{"rig", result.block.rigs[receiver.rig].name},
+                    {"lever_arm_m", vector(receiver.lever_arm)},
+                    {"sigma_lever_arm_m", vector(receiver.lever_arm_sigma)},
+                    {"boresight_deg", vector(receiver.boresight)},
+                    {"sigma_boresight_deg", vector(receiver.boresight_sigma)}});
   return list;
 }
 
@@ -138,6 +150,7 @@ std::string figures_json(const BlockResult& result, const Figures& f) {
       {"check_points_unused", unused_points(result, PointRole::kCheck).size()},
       {"cameras", cameras(result)},
       {"mounts", mounts(result)},
+      {"receivers", receivers(result)},
       {"failures", failures(result)},
       {"stages", stages(result)},
       {"notes", result.notes}};

@@ -78,7 +78,7 @@ std::optional<TrustedPair> TrustedPairs::relate(ImageIndex a, ImageIndex b) cons
   if (!options_.use_trajectory) return std::nullopt;
   const Image &image_a = block_.images[a], &image_b = block_.images[b];
   // Only rigs of several cameras are trusted.
-  if (block_.rig_of(image_a.frame).mounts.size() < 2) return std::nullopt;
+  if (block_.rig_of(image_a.frame).cameras().size() < 2) return std::nullopt;
   std::optional<Relative> frames = Relative{};
   if (image_b.frame < image_a.frame) {
     auto turned = relate(b, a);

@@ -219,8 +219,8 @@ class RigCalibrator {
   // A rig of a single camera has nothing to calibrate.
   void describe_mounts(const WholeBlock& whole) {
     for (RigIndex rig(0); block_.rigs.contains(rig); ++rig.value) {
-      if (block_.rigs[rig].mounts.size() < 2) continue;
-      for (std::size_t m = 0; m < block_.rigs[rig].mounts.size(); ++m) {
+      if (block_.rigs[rig].cameras().size() < 2) continue;
+      for (std::size_t m = 0; m < block_.rigs[rig].cameras().size(); ++m) {
         const Mount& mount = block_.rigs[rig].mounts[m];
         MountCalibration row;
         row.rig = rig;

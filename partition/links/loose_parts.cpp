@@ -21,7 +21,7 @@ namespace {
 using Frames = std::vector<FrameIndex>;
 
 bool has_arms(const Rig& rig) {
-  return std::ranges::any_of(rig.mounts,
+  return std::ranges::any_of(rig.cameras(),
                              [&](const Mount& m) { return m.pose.centre != rig.mounts.front().pose.centre; });
 }
 

@@ -44,7 +44,7 @@ ViewingCones::ViewingCones(const Block& block, double range_m) : range_m_(range_
   for (ImageIndex i(0); block.images.contains(i); ++i.value) {
     const FrameIndex frame = block.images[i].frame;
     const auto pose = known_pose(block.frames[frame]);
-    if (block.rig_of(frame).mounts.size() > 1 && pose)
+    if (block.rig_of(frame).cameras().size() > 1 && pose)
       cones_.push_back({true, camera_pose(*pose, block.mount_of(i).pose), block.camera_of(i)});
     else
       cones_.push_back({});

@@ -13,6 +13,7 @@
 #include "adjust/orientation/steps/plane_twins.h"
 #include "io/base/error.h"
 #include "io/block/held_priors.h"
+#include "io/block/observed_poses.h"
 
 namespace megablock {
 
@@ -53,9 +54,9 @@ Rows add_frames_and_images(const Block& block, const BlockState& start, const st
       OrientationGraph::FrameNode node{frame, {}, {}, {}};
       const Frame& given = block.frames[frame];
       if (options.observations.use_position_priors && given.position_prior)
-        node.position = comparable(*given.position_prior);
+        node.position = comparable(loosened(*given.position_prior, block.rigs[given.rig]));
       if (options.observations.use_attitude_priors && given.attitude_prior)
-        node.attitude = comparable(*given.attitude_prior);
+        node.attitude = comparable(loosened(*given.attitude_prior, block.rigs[given.rig]));
       if (start.oriented[frame]) {
         constexpr double kSigma = 0.01;  // metres
         node.given = start.frames[frame];

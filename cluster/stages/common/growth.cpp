@@ -20,7 +20,7 @@ Block first_images(const Block& block, std::int64_t n) {
   for (const Frame& frame : part.frames) rigs = std::max(rigs, frame.rig.value + 1);
   part.rigs.resize(static_cast<std::size_t>(rigs));
   for (const Rig& rig : part.rigs)
-    for (const Mount& mount : rig.mounts) cameras = std::max(cameras, mount.camera.value + 1);
+    for (const Mount& mount : rig.cameras()) cameras = std::max(cameras, mount.camera.value + 1);
   part.cameras.resize(static_cast<std::size_t>(cameras));
   part.relative_poses.clear();
   part.frame_measurements.clear();

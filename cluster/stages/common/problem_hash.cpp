@@ -18,8 +18,12 @@ void add_tables(Hasher& hasher, const TileProblem& p) {
 
 void add_frame_terms(Hasher& hasher, const TileProblem& p) {
   hasher.add(p.positions.size()).add(p.attitudes.size()).add(p.relatives.size());
-  for (const auto& term : p.positions) add_to_hash(hasher.add(term.frame.value), term.prior);
-  for (const auto& term : p.attitudes) add_to_hash(hasher.add(term.frame.value), term.prior);
+  const auto add_prior = [&](const auto& term) {
+    add_to_hash(hasher.add(term.frame.value), term.prior);
+    if (term.receiver >= 0) hasher.add(term.receiver);
+  };
+  for (const auto& term : p.positions) add_prior(term);
+  for (const auto& term : p.attitudes) add_prior(term);
   for (const auto& term : p.relatives) {
     hasher.add(term.from.value).add(term.to.value).add(term.rotation_sigma_rad).add(term.position_sigma_m);
     add_to_hash(hasher, term.pose);

@@ -34,7 +34,7 @@ std::vector<CameraIndex> cameras_of(const Block& block, RigIndex rig) {
     const auto& mounts = block.rigs[r].mounts;
     return std::any_of(mounts.begin(), mounts.end(), [&](const Mount& m) { return m.camera == camera; });
   };
-  for (const Mount& mount : block.rigs[rig].mounts) {
+  for (const Mount& mount : block.rigs[rig].cameras()) {
     if (!asks_its_images(block.cameras[mount.camera])) continue;
     bool earlier = false;
     for (RigIndex r(0); r < rig && !earlier; ++r.value) earlier = carries(r, mount.camera);

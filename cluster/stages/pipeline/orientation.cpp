@@ -60,8 +60,11 @@ void add_block_values(Hasher& hasher, const Block& block) {
     add_priors_to_hash(hasher, frame);
     if (frame.given_pose) add_to_hash(hasher.add('g'), *frame.given_pose);
   }
-  for (const Rig& rig : block.rigs)
+  for (const Rig& rig : block.rigs) {
     for (const Mount& mount : rig.mounts) add_to_hash(hasher.add(mount.camera.value), mount.pose);
+    // Priors are loosened by these.
+    if (rig.has_receiver()) hasher.add(rig.mounts.back().rotation_sigma_rad).add(rig.mounts.back().position_sigma_m);
+  }
   for (const Camera& camera : block.cameras) {
     hasher.add(camera.width).add(camera.height).add(camera.focal_known);
     add_to_hash(hasher, camera.intrinsics);
@@ -151,7 +154,8 @@ BlockState grow(const BlockState& state, const Block& block) {
   std::copy(state.frames.begin(), state.frames.end(), grown.frames.begin());
   std::copy(state.oriented.begin(), state.oriented.end(), grown.oriented.begin());
   std::copy(state.cameras.begin(), state.cameras.end(), grown.cameras.begin());
-  std::copy(state.mounts.begin(), state.mounts.end(), grown.mounts.begin());
+  for (RigIndex rig(0); state.mounts.contains(rig); ++rig.value)  // the rig may have got a receiver meanwhile
+    if (state.mounts[rig].size() == grown.mounts[rig].size()) grown.mounts[rig] = state.mounts[rig];
   return grown;
 }
 

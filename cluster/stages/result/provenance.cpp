@@ -85,13 +85,16 @@ std::function<std::string(const UnknownId&)> names_of(const Block& block) {
     switch (id.kind) {
       case UnknownKind::kFrame: {
         const FrameIndex frame(id.index);
-        const bool single = block.rig_of(frame).mounts.size() == 1;
+        const bool single = block.rig_of(frame).cameras().size() == 1;
         return (single ? "image '" : "frame '") + block.frames[frame].name + "'";
       }
       case UnknownKind::kCamera:
         return "camera '" + block.cameras[CameraIndex(id.index)].name + "'";
-      case UnknownKind::kMount:
-        return "mount " + std::to_string(id.part) + " of rig '" + block.rigs[RigIndex(id.index)].name + "'";
+      case UnknownKind::kMount: {
+        const Rig& rig = block.rigs[RigIndex(id.index)];
+        const bool receiver = id.part == std::ssize(rig.cameras());
+        return (receiver ? "receiver" : "mount " + std::to_string(id.part)) + " of rig '" + rig.name + "'";
+      }
     }
     return describe(id);
   };

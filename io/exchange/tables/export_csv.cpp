@@ -144,7 +144,7 @@ void write_cameras(const BlockResult& result, const std::string& path) {
 }
 
 bool has_rig(const Block& block) {
-  return std::any_of(block.rigs.begin(), block.rigs.end(), [](const Rig& rig) { return rig.mounts.size() > 1; });
+  return std::any_of(block.rigs.begin(), block.rigs.end(), [](const Rig& rig) { return rig.cameras().size() > 1; });
 }
 
 // Writes the mounts of rigs with two or more cameras. The sigmas are along and about the axes of the rig.
@@ -156,8 +156,8 @@ void write_mounts(const BlockResult& result, const std::string& path) {
   writer.print("\n");
   for (RigIndex r(0); result.block.rigs.contains(r); ++r.value) {
     const Rig& rig = result.block.rigs[r];
-    if (rig.mounts.size() < 2) continue;
-    for (std::size_t m = 0; m < rig.mounts.size(); ++m) {
+    if (rig.cameras().size() < 2) continue;
+    for (std::size_t m = 0; m < rig.cameras().size(); ++m) {
       const Pose& pose = result.state.mounts[r][m];
       const Eigen::Quaterniond& q = pose.rotation;
       writer.print("{},{},{}", csv_field(rig.name), m, csv_field(result.block.cameras[rig.mounts[m].camera].name));

@@ -6,6 +6,7 @@
 
 #include "geometry/numbers/angles.h"
 #include "io/evaluation/feature_statistics.h"
+#include "io/evaluation/receivers.h"
 #include "io/report/drawing/html.h"
 #include "io/report/sections/sections.h"
 
@@ -116,16 +117,16 @@ void add_mount_sigmas(const Mount& mount, const BlockResult::Matrix6& covariance
 
 std::string mounts_table(const BlockResult& result, RigIndex index) {
   const Rig& rig = result.block.rigs[index];
-  if (rig.mounts.size() < 2 || !result.state.mounts.contains(index)) return "";
+  if (rig.cameras().size() < 2 || !result.state.mounts.contains(index)) return "";
   const bool sigmas = result.mount_covariance.contains(index) &&
-                      std::any_of(rig.mounts.begin(), rig.mounts.end(), [](const Mount& m) { return !m.held(); });
+                      std::ranges::any_of(rig.cameras(), [](const Mount& m) { return !m.held(); });
   std::vector<std::string> headings = {
       "mount of " + escape(rig.name), "x [m]", "y [m]", "z [m]", "turned by [°]", "moved by [mm]"};
   if (sigmas)
     headings.insert(headings.end(),
                     {"σx [mm]", "σy [mm]", "σz [mm]", "σ about x [°]", "σ about y [°]", "σ about z [°]"});
   Table table(std::move(headings));
-  for (std::size_t m = 0; m < rig.mounts.size() && m < result.state.mounts[index].size(); ++m) {
+  for (std::size_t m = 0; m < rig.cameras().size() && m < result.state.mounts[index].size(); ++m) {
     const Pose &start = rig.mounts[m].pose, &now = result.state.mounts[index][m];
     const bool held = rig.mounts[m].held();
     std::vector<std::string> cells = {
@@ -139,6 +140,32 @@ std::string mounts_table(const BlockResult& result, RigIndex index) {
     table.add(std::move(cells));
   }
   return table.html();
+}
+
+// The receivers that the block estimated, in a table of the report.
+std::string receivers_table(const BlockResult& result) {
+  Table table({"receiver of", "of", "x", "y", "z", "σx", "σy", "σz"});
+  const auto add = [&](const std::string& rig, const char* what, const Eigen::Vector3d& value,
+                       const Eigen::Vector3d& sigma, int digits) {
+    if (sigma.isZero()) return;
+    std::vector<std::string> cells = {escape(rig), what};
+    for (const double v : value) cells.push_back(fixed(v, digits));
+    for (const double s : sigma) cells.push_back(fixed(s, digits));
+    table.add(std::move(cells));
+  };
+  for (const ReceiverFigures& receiver : receivers_of(result)) {
+    const std::string& rig = result.block.rigs[receiver.rig].name;
+    add(rig, "lever arm [m]", receiver.lever_arm, receiver.lever_arm_sigma, 3);
+    add(rig, "change of it [m]", receiver.lever_arm_change, receiver.lever_arm_sigma, 3);
+    add(rig, "boresight [°]", receiver.boresight, receiver.boresight_sigma, 4);
+  }
+  if (table.empty()) return "";
+  return "<h3>Receivers</h3>" +
+         paragraph(
+             "Position of the antenna and rotation vector of the observed attitudes, in the axes of the camera or "
+             "rig: x right, y down, z ahead.",
+             "muted") +
+         table.html();
 }
 
 std::string interest_points_table(const BlockResult& result) {
@@ -190,7 +217,7 @@ std::string cameras_section(const BlockResult& result, const Figures& f) {
       "over its sigma. Parameters within " +
           fixed(kSignificant, 0) + " sigma are not significant and shown faint.",
       "muted");
-  return section("cameras", "Cameras", note + body + mounts + interest_points_table(result));
+  return section("cameras", "Cameras", note + body + mounts + receivers_table(result) + interest_points_table(result));
 }
 
 }  // namespace megablock::report

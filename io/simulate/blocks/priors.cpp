@@ -2,10 +2,12 @@
 //
 // With the true pose (R, C) of a frame and normal errors n:
 //
-//     position    P = C + R' a + gps_sigma n         of the antenna; a is its lever arm in axes of the rig
-//     attitude    R_m = Exp(sigma n) R               the error turns about the axes of the rig
+//     position    P = C + R' (a + c) + gps_sigma n   of the antenna; a is its lever arm in axes of the rig
+//     attitude    R_m = Exp(b) Exp(sigma n) R        the errors turn about the axes of the rig
 //     relative    R_ab = Exp(sigma n) R_b R_a',  t_ab = R_a (C_b - C_a) + sigma n
 //     given pose  C + sigma e, R Exp(sigma e)        e: DriftingError, about the axes of the ground
+//
+// The errors c and b of lever arm and boresight are nothing unless the options ask for them.
 //
 // The job uses the same forms for its residuals, so that every weighted residual of the truth is standard normal.
 #include "io/simulate/blocks/priors.h"
@@ -109,14 +111,16 @@ void simulate_priors(const SimulationOptions& options, SimulatedBlock& simulated
       PositionPrior prior;
       prior.sigma.setConstant(options.gps_sigma_m);
       prior.lever_arm = lever_arm;
-      prior.position = pose.centre + pose.rotation.conjugate() * lever_arm + options.gps_sigma_m * position_noise;
+      const Eigen::Vector3d antenna = lever_arm + options.lever_arm_error_m * kOffReceiver;
+      prior.position = pose.centre + pose.rotation.conjugate() * antenna + options.gps_sigma_m * position_noise;
       frame.position_prior = prior;
     }
     if (options.attitude_sigma_deg > 0) {
       AttitudePrior prior;
       prior.sigma_rad.setConstant(kDegree * options.attitude_sigma_deg);
       const Eigen::Vector3d turn = kDegree * options.attitude_sigma_deg * attitude_noise;
-      prior.rotation_cw = (rotation_exp<double>(turn) * pose.rotation).normalized();
+      const Eigen::Quaterniond boresight = rotation_exp<double>(kDegree * options.boresight_error_deg * kOffReceiver);
+      prior.rotation_cw = (boresight * rotation_exp<double>(turn) * pose.rotation).normalized();
       frame.attitude_prior = prior;
     }
     if (given) {

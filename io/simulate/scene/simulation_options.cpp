@@ -136,6 +136,8 @@ void SimulationOptions::check() const {
   require_option(outlier_share >= 0 && outlier_share < 1, "the share of outliers must lie in [0, 1)");
   require_option(gps_share >= 0 && gps_share <= 1, "gps_share must lie in [0, 1]");
   require_option(std::abs(gps_sigma_m) <= kFarthest_m, "gps_sigma_m must be at most 1e5");
+  require_option(std::abs(lever_arm_error_m) <= 1000, "lever_arm_error_m must be at most 1000");
+  require_option(std::abs(boresight_error_deg) <= 180, "boresight_error_deg must be at most 180");
   require_option(std::abs(attitude_sigma_deg) <= 180, "attitude_sigma_deg must be at most 180");
   require_option(std::abs(relative_position_sigma_m) <= kFarthest_m, "relative_position_sigma_m must be at most 1e5");
   require_option(std::abs(relative_rotation_sigma_deg) <= 180, "relative_rotation_sigma_deg must be at most 180");

@@ -69,6 +69,9 @@ struct SimulationOptions {
   double gps_sigma_m = 0.05;      // <= 0: no position priors. Stated = true sigma, except for Stereopolis
   double gps_share = 1;           // share of frames with a position prior
   double attitude_sigma_deg = 0;  // <= 0: no attitude priors
+  // The antenna lies off its stated lever arm, and the attitudes are turned against the rig, by these lengths along
+  // kOffReceiver (io/simulate/blocks/priors.h).
+  double lever_arm_error_m = 0, boresight_error_deg = 0;
   double relative_position_sigma_m = 0, relative_rotation_sigma_deg = 0.01;  // of successive frames; <= 0: none
   double start_position_error_m = 1, start_rotation_error_deg = 1;           // of given poses; < 0: no given poses
   // > 0, with relative poses: the given poses are the integrated relative poses, from the true pose of the first frame

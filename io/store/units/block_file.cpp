@@ -109,8 +109,9 @@ void put_rigs(Hdf5Writer& file, const IndexedVector<RigIndex, Rig>& rigs) {
   file.texts("rigs/name", column(rigs, [](const Rig& r) { return r.name; }));
   file.vector("rigs/mounts", column(rigs, [](const Rig& r) { return static_cast<std::int32_t>(r.mounts.size()); }),
               {"", "number of mounts: rows of the group 'mounts', in the order of the rigs"});
-  file.group("mounts", "one row per camera of a rig");
-  file.vector("mounts/camera", column(mounts, [](const Mount& m) { return m.camera.value; }), {"", "row in cameras"});
+  file.group("mounts", "one row per camera of a rig, and one for its receiver, if it has one");
+  file.vector("mounts/camera", column(mounts, [](const Mount& m) { return m.camera.value; }),
+              {"", "row in cameras; -1: the receiver"});
   file.group("mounts/start");
   write_poses(file, "mounts/start", column(mounts, [](const Mount& m) { return m.pose; }), "camera", "rig");
   file.vector("mounts/rotation_sigma", column(mounts, [](const Mount& m) { return m.rotation_sigma_rad; }),
@@ -263,7 +264,7 @@ void put_images(Hdf5Writer& file, const IndexedVector<ImageIndex, Image>& images
     // does not use this column.
     const bool sound = block.frames.contains(image.frame) && block.rigs.contains(block.frames[image.frame].rig) &&
                        image.mount >= 0 &&
-                       static_cast<std::size_t>(image.mount) < block.rig_of(image.frame).mounts.size();
+                       static_cast<std::size_t>(image.mount) < block.rig_of(image.frame).cameras().size();
     cameras.push_back(sound ? block.rig_of(image.frame).mounts[static_cast<std::size_t>(image.mount)].camera.value
                             : -1);
   }

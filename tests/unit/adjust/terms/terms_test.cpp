@@ -37,6 +37,11 @@ SimulatedBlock block_with_all_types() {
       rig.mounts[m].rotation_sigma_rad = 0.01;
       rig.mounts[m].position_sigma_m = 0.05;
     }
+  for (RigIndex rig(0); simulated.block.rigs.contains(rig); ++rig.value) {
+    const Pose receiver{rotation_exp<double>(Eigen::Vector3d(0.2, -0.3, 0.1)), {0.3, 0.1, -0.5}};
+    simulated.block.rigs[rig].mounts.push_back({CameraIndex(), receiver, 0.02, 0.1});
+    simulated.truth.mounts[rig].push_back(receiver);
+  }
   for (Camera& camera : simulated.block.cameras) camera.prior_sigma[kFocal] = 5;
   for (const FrameMeasurementType& type : frame_measurement_types())
     for (std::int64_t f = 0; f + 7 < std::ssize(simulated.block.frames); f += 3)
@@ -82,6 +87,19 @@ TEST(ObservationTypes, AreAllInTheBlock) {
   const Scene scene;
   for (const ObservationType* type : observation_types()) EXPECT_GT(type->count(scene.problem), 0u);
   EXPECT_EQ(observation_types().size(), observation_types_of_cost().size());
+}
+
+// A receiver is a mount without images; positions and attitudes depend on it, and its prior is there once.
+TEST(ObservationTypes, DependOnTheReceiver) {
+  const Scene scene;
+  const std::int32_t receiver = static_cast<std::int32_t>(scene.problem.mounts.size()) - 1;
+  EXPECT_EQ(scene.problem.mounts.back().mount, 2);
+  EXPECT_EQ(scene.problem.mount_free.back(), 1);
+  EXPECT_FALSE(scene.problem.positions.empty() || scene.problem.attitudes.empty());
+  for (const auto& term : scene.problem.positions) EXPECT_EQ(term.receiver, receiver);
+  for (const auto& term : scene.problem.attitudes) EXPECT_EQ(term.receiver, receiver);
+  for (const TileImage& image : scene.problem.images) EXPECT_NE(image.mount, receiver);
+  EXPECT_EQ(std::ranges::count(scene.problem.mount_priors, receiver, &TileProblem::MountTerm::mount), 1);
 }
 
 TEST(ObservationTypes, HaveTheDerivativesOfFiniteDifferences) {

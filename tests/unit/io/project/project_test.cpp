@@ -233,6 +233,26 @@ TEST(Project, StageSectionsKeepFileAndLine) {
   EXPECT_THAT(refusal(folder, "images: images\nmaching: {ratio: 0.7}\n"), HasSubstr("did you mean 'matching'?"));
 }
 
+// A lever arm or boresight with a sigma is an unknown: the rig gets a receiver.
+TEST(Project, FreesLeverArmsAndBoresights) {
+  ScratchDirectory folder;
+  write_line(folder, 3);
+  const auto rig = [&](const std::string& text) {
+    return read_text(folder, "images: images\n" + text).block.rigs[RigIndex(0)];
+  };
+  EXPECT_FALSE(rig("gps: {lever_arm_sigma_m: 0}\n").has_receiver());
+  const Rig arm = rig("gps: {lever_arm_sigma_m: 0.25}\n");
+  ASSERT_TRUE(arm.has_receiver());
+  EXPECT_EQ(arm.cameras().size(), 1u);
+  EXPECT_EQ(arm.mounts.back().position_sigma_m, 0.25);
+  EXPECT_EQ(arm.mounts.back().rotation_sigma_rad, 0);
+  EXPECT_THAT(refusal(folder, "images: images\ngps: {lever_arm_sigma_m: -1}\n"), HasSubstr("lever_arm_sigma_m"));
+  EXPECT_THAT(refusal(folder, "images: images\nattitude: {boresight_deg: [1, 2]}\n"),
+              HasSubstr("must be a list of 3 numbers"));
+  EXPECT_THAT(refusal(folder, "images: images\nattitude: {boresight_sigma_deg: 1e9}\n"),
+              HasSubstr("boresight_sigma_deg"));
+}
+
 // For the report's list of options: as they were written.
 TEST(Project, KeepsWhatIsSaidOfPositionsAndAttitudes) {
   ScratchDirectory folder;

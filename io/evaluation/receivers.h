@@ -1,0 +1,40 @@
+// Tells what a block found out about its receivers: lever arms and boresights that were estimated, and those that were
+// taken as given but contradict the images.
+//
+// The difference y_f of an observed position or attitude from the adjusted pose of frame f, in axes of the rig (metres,
+// radians), is
+//
+//     y_f = c + R_f g + noise,
+//
+// with c the error of the lever arm or boresight, which moves with the rig, and g a shift or turn of the datum, which
+// stays with the ground. Both are estimated in least squares over the frames of a rig; differences of more than 3.5
+// times the usual are left out and the rest is solved again, twice. Where all frames look the same way, c and g cannot
+// be told apart, and c is not known; of cameras that all look down, this is true along their axis.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "io/evaluation/figures.h"
+#include "io/result/result.h"
+
+namespace megablock {
+
+// Of a rig whose project leaves lever arm or boresight free. Sigmas of 0: held as given.
+struct ReceiverFigures {
+  RigIndex rig;
+  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero(), lever_arm_sigma = Eigen::Vector3d::Zero();  // metres, rig axes
+  Eigen::Vector3d lever_arm_change = Eigen::Vector3d::Zero();  // adjusted minus given, metres
+  // Rotation vector from the axes of the rig to those of the observed attitudes, degrees.
+  Eigen::Vector3d boresight = Eigen::Vector3d::Zero(), boresight_sigma = Eigen::Vector3d::Zero();
+};
+std::vector<ReceiverFigures> receivers_of(const BlockResult& result);
+
+// "lever arm 0.102, -0.601, -0.203 m (sigma 0.004, 0.004, 0.006 m), 0.31 m from the given one; boresight ...".
+std::string receiver_text(const ReceiverFigures& receiver);
+
+// One line for each rig whose antenna or attitudes are off by one vector of the rig, with the option that estimates it.
+std::vector<std::string> receiver_remarks(const BlockResult& result, const report::Figures& figures);
+
+}  // namespace megablock
