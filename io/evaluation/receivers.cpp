@@ -19,7 +19,7 @@ namespace megablock {
 namespace {
 
 constexpr std::size_t kFewestDifferences = 8;         // differences of a rig
-constexpr double kOfOwnSigma = 5, kOfOneStated = 1;   // times these a vector is named
+constexpr double kOfOwnSigma = 5;                     // times this a vector is named
 constexpr double kUsual = 3.5, kOfMedian = 1.4826;    // median absolute value of normal errors to their sigma
 constexpr double kLeastM = 0.01, kLeastRad = 0.0002;  // smaller vectors matter to nobody
 
@@ -34,6 +34,7 @@ struct Difference {
 
 struct Common {
   Eigen::Vector3d vector, sigma;
+  double scatter = 0;  // sigma of what remains of the differences, per axis
 };
 
 // Sigmas between those of held and of unknown values.
@@ -85,7 +86,7 @@ Common solve(const std::vector<Difference>& differences, const std::vector<std::
     if (takes[i]) squares += rest.squaredNorm();
   }
   const double of_one = squares / std::max(1.0, 3 * count - 6);
-  Common common{x.head<3>(), (of_one * variance.head<3>()).cwiseSqrt()};
+  Common common{x.head<3>(), (of_one * variance.head<3>()).cwiseSqrt(), std::sqrt(of_one)};
   for (int k = 0; k < 3; ++k)
     if (open[k] > kOpen) common.sigma[k] = std::numeric_limits<double>::infinity();
   return common;
@@ -104,11 +105,12 @@ std::optional<Common> common_in_rig(const std::vector<Difference>& differences) 
   return common;
 }
 
-// Whether the vector is far from zero along some axis, for its own sigma, for a single observation, and at all.
+// Whether the vector is far from zero along some axis: for its own sigma, for a single observation as stated and as it
+// is, and at all. Errors of positions often drift, and drifts of long drives have a mean that is no lever arm.
 bool is_named(const Common& common, const std::vector<Difference>& differences, double least) {
   std::vector<double> stated;
   for (const Difference& d : differences) stated.push_back(d.sigma);
-  const double enough = std::max(least, kOfOneStated * median(std::move(stated)));
+  const double enough = std::max({least, common.scatter, median(std::move(stated))});
   return ((common.vector.array().abs() > kOfOwnSigma * common.sigma.array()) && (common.vector.array().abs() > enough))
       .any();
 }

@@ -9,7 +9,8 @@
 // with c the error of the lever arm or boresight, which moves with the rig, and g a shift or turn of the datum, which
 // stays with the ground. Both are estimated in least squares over the frames of a rig; differences of more than 3.5
 // times the usual are left out and the rest is solved again, twice. Where all frames look the same way, c and g cannot
-// be told apart, and c is not known; of cameras that all look down, this is true along their axis.
+// be told apart, and c is not known; of cameras that all look down, this is true along their axis. An error is named where
+// it is larger than five of its sigmas, than the stated sigma, and than what remains of the differences.
 #pragma once
 
 #include <Eigen/Core>

@@ -104,6 +104,18 @@ TEST(Receivers, OutliersChangeNothing) {
   EXPECT_THAT(block.lines(), IsEmpty());
 }
 
+// A receiver whose satellites are masked is off by what changes slowly.
+TEST(Receivers, ADriftIsNoLeverArm) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    SeenFromRig block(400, 15);
+    block.random.seed(seed);
+    block.positions({0, 0, 0}, {0, 0, 0});
+    Eigen::Vector3d drift = block.noise(0.2);
+    for (report::PositionResidual& r : block.figures.positions) r.difference += drift += block.noise(0.02);
+    EXPECT_THAT(block.lines(), IsEmpty()) << seed;
+  }
+}
+
 TEST(Receivers, ABoresightIsNamedUnlessItIsEstimated) {
   SeenFromRig block(60, 15);
   block.attitudes({0.5, -1.5, 0.7});
