@@ -89,10 +89,11 @@ void divide_pose(Draw draw, Pose& pose, double& rotation_sigma, double& position
 
 }  // namespace
 
-bool takes_track(const HalfChoice& choice, ImageIndex first) {
+bool takes_track(const HalfChoice& choice, ImageIndex middle) {
   if (choice.half != Half::kTiePoints1 && choice.half != Half::kTiePoints2) return true;
-  const std::uint64_t of_pair = hash_of(choice, Kind::kTrack, {first.value / 2});
-  return ((of_pair + static_cast<std::uint64_t>(first.value)) % 2 == 0) == first_half(choice.half);
+  const std::int64_t place = middle.value + choice.division % 2;
+  const std::uint64_t of_pair = hash_of(choice, Kind::kTrack, {place / 2});
+  return ((of_pair + static_cast<std::uint64_t>(place)) % 2 == 0) == first_half(choice.half);
 }
 
 bool takes_row(const HalfChoice& choice, std::initializer_list<std::int64_t> numbers) {

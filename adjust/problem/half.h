@@ -1,10 +1,12 @@
 // Divides the observations of a block into two halves with independent errors. Two adjustments of them differ by their
 // errors alone, so that the difference over its sigma shows whether the sigmas are true (a split test).
 //
-// Tie points are divided by the image in which their tracks begin: of two images that follow each other, the tracks
-// that begin in the one are in the first half, those that begin in the other in the second half; a hash says which.
-// Tracks of one image often have errors in common, neighbours most of all. Divided track by track or by fields of the
-// images, both halves would have these errors, and their difference would not show them.
+// Tie points are divided by the middle image of their tracks: of two images that follow each other, the tracks of the
+// one are in the first half, those of the other in the second half; a hash says which. Divisions of even and odd number
+// pair the images differently, 0 with 1 or 1 with 2. Tracks of one image often have errors in common, neighbours most
+// of all. Divided track by track or by fields of the images, both halves would have these errors, and their difference
+// would not show them. Divided by their first image, one half would lack the first image of the block, and the halves
+// of a small block would differ much in size: a third of all tracks of 11 images begins in the first.
 //
 // All other observations are few, and the datum and many unknowns rest on them, so that each stays in both halves with
 // an error of its own there. With
@@ -31,8 +33,8 @@
 
 namespace megablock {
 
-// Whether a track that begins in this image is in the half. Always true without a half and with halves of images.
-bool takes_track(const HalfChoice& choice, ImageIndex first);
+// Whether a track with this middle image is in the half. Always true without a half and with halves of images.
+bool takes_track(const HalfChoice& choice, ImageIndex middle);
 // Whether a line or a vertical with these numbers is.
 bool takes_row(const HalfChoice& choice, std::initializer_list<std::int64_t> numbers);
 // [frames] 1: in the half. Empty where no images are divided.

@@ -199,14 +199,16 @@ class TileBuilder {
   }
 
   // Whether a track is in the half of a split test. Parts of a track that was split (track_parts.h) have its index and
-  // follow each other. They are in one half, that of the first of all their images.
+  // follow each other. They are in one half, that of the middle one of all their images.
   bool takes(std::int64_t t) {
     if (options_.half.half == Half::kNone || (t > 0 && owned_.id[t] == owned_.id[t - 1])) return taken_;
-    ImageIndex first = owned_.image[owned_.begin[t]];
+    std::vector<ImageIndex> images;
     for (std::int64_t part = t; part < owned_.track_count() && owned_.id[part] == owned_.id[t]; ++part)
       for (std::int64_t row = owned_.begin[part]; row < owned_.begin[part + 1]; ++row)
-        first = std::min(first, owned_.image[row]);
-    taken_ = takes_track(options_.half, first);
+        images.push_back(owned_.image[row]);
+    const auto middle = images.begin() + std::ssize(images) / 2;
+    std::nth_element(images.begin(), middle, images.end());
+    taken_ = takes_track(options_.half, *middle);
     return taken_;
   }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "geometry/numbers/decompositions.h"
 #include "merge/plan/unknowns.h"
@@ -13,61 +14,23 @@ namespace megablock {
 
 namespace {
 
-constexpr double kLeverageUnits = 32;
-constexpr double kFields = 12;  // along the longer side of an image
-// A cluster whose unknowns follow its residuals nearly completely tells little; its score is not multiplied further.
-constexpr double kMostShare = 0.8;
+// Squares of the ratio one that rho starts with.
+constexpr double kSquaresBefore = 2;
 
-std::int64_t first_kept(const TileProblem& problem, std::int64_t point) {
-  std::int64_t row = problem.begin[at(point)];
-  while (!problem.kept[at(row)]) ++row;
-  return row;
-}
-
-// The image in which a point begins, and the number of the field there.
-std::pair<std::int32_t, std::int32_t> field_of(const TileProblem& problem, const std::vector<double>& extents,
-                                               std::int64_t point) {
-  const std::int64_t row = first_kept(problem, point);
-  const LocalImage image = problem.image[at(row)];
-  const double field = extents[at(problem.images[at(image.value)].camera.value)] / kFields;
-  const auto along = [&](double pixel) { return static_cast<std::int32_t>(std::floor(pixel / field)) & 0x7fff; };
-  return {image.value, along(problem.x[at(row)]) | along(problem.y[at(row)]) << 15};
-}
-
-// The share of the errors of a cluster that its unknowns follow.
-double followed_share(double concentration, double leverage, double rank) {
-  return std::min(kMostShare, concentration * leverage / std::max(1.0, rank));
+// The middle one of the images that keep a point.
+std::int32_t middle_image(const TileProblem& problem, std::int64_t point) {
+  const std::int64_t first = problem.begin[at(point)], last = problem.begin[at(point) + 1];
+  std::int64_t before = std::accumulate(problem.kept.begin() + first, problem.kept.begin() + last, std::int64_t{0}) / 2;
+  std::int64_t row = first;
+  while (!problem.kept[at(row)] || before-- > 0) ++row;
+  return problem.image[at(row)].value;
 }
 
 }  // namespace
 
-std::vector<double> observed_extents(const TileProblem& problem) {
-  std::vector<double> extents(problem.cameras.size(), 1);
-  for (std::size_t row = 0; row < problem.kept.size(); ++row) {
-    if (!problem.kept[row]) continue;
-    double& extent = extents[at(problem.images[at(problem.image[row].value)].camera.value)];
-    extent = std::max({extent, problem.x[row], problem.y[row]});
-  }
-  return extents;
-}
-
-ClusterWeights cluster_weights(const TileProblem& problem, const TileCovariance& covariance) {
-  ClusterWeights weights{std::vector<std::uint8_t>(problem.points.size(), 0), observed_extents(problem),
-                         covariance.concentration};
-  for (std::size_t p = 0; p < problem.points.size(); ++p) {
-    double sum = 0;
-    bool any = false;
-    for (std::int64_t row = problem.begin[p]; row < problem.begin[p + 1]; ++row) {
-      const double x = covariance.redundancy_x[at(row)], y = covariance.redundancy_y[at(row)];
-      if (!problem.kept[at(row)] || !std::isfinite(x) || !std::isfinite(y)) continue;
-      any = true;
-      sum += 2 - x - y;
-    }
-    // The point itself takes three.
-    if (any)
-      weights.leverages[p] = static_cast<std::uint8_t>(std::lround(std::clamp((sum - 3) * kLeverageUnits, 0.0, 255.0)));
-  }
-  return weights;
+ClusterWeights cluster_weights(const ImageSpread& spread) {
+  const double g = spread.unshrunk(), f = 1 + 2 * (1 - kMeanShare) * (1 - kMeanShare) * (1 - 1 / g);
+  return {f * g, f * spread.ratio()};
 }
 
 ClusterScores::ClusterScores(const TileProblem& problem, const TilePlan& plan, const ClusterWeights& weights,
@@ -76,13 +39,10 @@ ClusterScores::ClusterScores(const TileProblem& problem, const TilePlan& plan, c
   for (const Unknown& u : plan.unknowns) rows_.push_back(front.row_of(u.id));
 }
 
-ClusterScores::Cluster& ClusterScores::cluster_of(std::int64_t point) {
-  Cluster& cluster = clusters_[field_of(problem_, weights_.extents, point)];
-  if (cluster.column < 0) {
-    cluster.column = std::ssize(scores_);
-    scores_.push_back(Eigen::VectorXd::Zero(front_.dimension()));
-  }
-  return cluster;
+Eigen::VectorXd& ClusterScores::score_of(std::int64_t point) {
+  const auto [place, is_new] = clusters_.try_emplace(middle_image(problem_, point));
+  if (is_new) place->second.setZero(front_.dimension());
+  return place->second;
 }
 
 void ClusterScores::add_points(const PointEquations& equations) {
@@ -95,11 +55,7 @@ void ClusterScores::add_points(const PointEquations& equations) {
       if (rows_[at(a)] >= rows_[at(b)]) add_block(front_, rows_[at(a)], rows_[at(b)], weight * block);
     });
     if (!tie) continue;
-    Cluster& cluster = cluster_of(point.point);
-    Eigen::VectorXd& score = scores_[at(cluster.column)];
-    cluster.leverage += weights_.leverages[at(point.point)] / kLeverageUnits;
-    cluster.rank += 2 * point.observation_count() - 3;
-    ++cluster.points;
+    Eigen::VectorXd& score = score_of(point.point);
     reduced.visit_score([&](std::int64_t unknown, const Eigen::Ref<const Eigen::VectorXd>& part) {
       score.segment(rows_[at(unknown)], part.size()) += part;
     });
@@ -112,19 +68,16 @@ TermResidual ClusterScores::with_formal(TermResidual term) {
 }
 
 void ClusterScores::finish() {
-  const std::int64_t n = front_.dimension(), count = std::ssize(scores_);
-  if (count == 0) return;
-  Eigen::MatrixXd scores(n, count);
-  for (auto& [key, cluster] : clusters_) {
-    const double rank = static_cast<double>(cluster.rank) / static_cast<double>(cluster.points);
-    const double share = followed_share(weights_.concentration, cluster.leverage, rank);
-    scores.col(cluster.column) =
-        scores_[at(cluster.column)] * std::sqrt((1 - kMeanShare) * kScoreWeight * weights_.inflation / (1 - share));
-  }
+  if (clusters_.empty()) return;
+  const std::int64_t n = front_.dimension();
+  Eigen::MatrixXd scores(n, std::ssize(clusters_));
+  Eigen::Index column = 0;
+  for (const auto& [image, score] : clusters_)
+    scores.col(column++) = score * std::sqrt((1 - kMeanShare) * kScoreWeight * weights_.unshrunk);
   Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(n, n);
   squares.selfadjointView<Eigen::Lower>().rankUpdate(scores);
-  for (std::int64_t column = 0; column < n; ++column)
-    for (std::int64_t row = column; row < n; ++row) *front_.place(row, column).values += squares(row, column);
+  for (std::int64_t j = 0; j < n; ++j)
+    for (std::int64_t i = j; i < n; ++i) *front_.place(i, j).values += squares(i, j);
 }
 
 void ImageSpread::Sum::add(const Sum& other) {
@@ -134,13 +87,13 @@ void ImageSpread::Sum::add(const Sum& other) {
 
 void ImageSpread::add(const ImageSpread& other) {
   images.add(other.images);
-  fields.add(other.fields);
+  trace += other.trace;
   for (const auto& [camera, sum] : other.cameras) cameras[camera].add(sum);
 }
 
-double ImageSpread::inflation() const { return std::max(1.0, images.ratio() / fields.ratio()); }
+double ImageSpread::ratio() const { return (images.squares + kSquaresBefore) / (images.expected + kSquaresBefore); }
 
-double ImageSpread::ratio() const { return fields.ratio() * inflation(); }
+double ImageSpread::unshrunk() const { return images.expected > 0 ? trace / images.expected : 1; }
 
 double ImageSpread::camera_inflation(std::int64_t camera, double reached) const {
   const auto found = cameras.find(camera);
@@ -150,7 +103,7 @@ double ImageSpread::camera_inflation(std::int64_t camera, double reached) const 
 Bytes ImageSpread::to_bytes() const {
   ByteWriter out;
   out.value(images);
-  out.value(fields);
+  out.value(trace);
   for (const auto& [camera, sum] : cameras) {
     out.value(camera);
     out.value(sum);
@@ -162,7 +115,7 @@ ImageSpread ImageSpread::from_bytes(const Bytes& bytes) {
   ByteReader in(bytes);
   ImageSpread spread;
   spread.images = in.value<Sum>();
-  spread.fields = in.value<Sum>();
+  spread.trace = in.value<double>();
   while (!in.at_end()) {
     const auto camera = in.value<std::int64_t>();
     spread.cameras[camera] = in.value<Sum>();
@@ -176,9 +129,8 @@ double spread_share(std::int64_t images, std::int64_t cameras) {
   return images <= enough ? 1 : static_cast<double>(enough) / static_cast<double>(images);
 }
 
-ImageClusters::ImageClusters(const TileProblem& problem, const TilePlan& plan, const std::vector<double>& extents,
-                             double share)
-    : problem_(problem), plan_(plan), extents_(extents) {
+ImageClusters::ImageClusters(const TileProblem& problem, const TilePlan& plan, double share)
+    : problem_(problem), plan_(plan) {
   // The multiples of the golden ratio, modulo 1, are spread evenly over [0, 1), also those of every n-th image.
   for (const TileImage& image : problem.images) {
     const double multiple = static_cast<double>(image.image.value) * std::numbers::phi;
@@ -196,16 +148,12 @@ Eigen::Index ImageClusters::Cluster::row_of(std::int64_t unknown, Eigen::Index d
   return place->second.first;
 }
 
-void ImageClusters::add_point(const PointEquations& equations, std::size_t i, double leverage) {
+void ImageClusters::add_point(const PointEquations& equations, std::size_t i) {
   const PointEquations::Point& point = equations.points()[i];
   if (problem_.points[at(point.point)].role != PointRole::kTie) return;
-  const auto [image, number] = field_of(problem_, extents_, point.point);
+  const std::int32_t image = middle_image(problem_, point.point);
   if (!in_sample_[at(image)]) return;
   Cluster& cluster = clusters_[image];
-  Field& field = cluster.fields[number];
-  field.leverage += leverage;
-  field.rank += static_cast<double>(2 * point.observation_count() - 3);
-  ++field.points;
   ReducedPoint reduced(equations, i);
   reduced.visit_normal([&](std::int64_t a, std::int64_t b, const Eigen::Ref<const Eigen::MatrixXd>& block) {
     const Eigen::Index row = cluster.row_of(a, block.rows()), column = cluster.row_of(b, block.cols());
@@ -213,14 +161,11 @@ void ImageClusters::add_point(const PointEquations& equations, std::size_t i, do
   });
   reduced.visit_score([&](std::int64_t unknown, const Eigen::Ref<const Eigen::VectorXd>& part) {
     const Eigen::Index row = cluster.row_of(unknown, part.size());
-    if (field.score.size() < cluster.score.size())
-      field.score.conservativeResizeLike(Eigen::VectorXd::Zero(cluster.score.size()));
     cluster.score.segment(row, part.size()) += part;
-    field.score.segment(row, part.size()) += part;
   });
 }
 
-void ImageClusters::finish(const CovarianceOf& covariance_of, CellSpread& spread) {
+void ImageClusters::finish(const CovarianceOf& covariance_of, ImageSpread& spread) {
   for (auto& [image, cluster] : clusters_) {
     const Eigen::Index n = cluster.score.size();
     Eigen::MatrixXd covariance(n, n);
@@ -230,12 +175,8 @@ void ImageClusters::finish(const CovarianceOf& covariance_of, CellSpread& spread
     // P = C S; E s's = S - S C S.
     const Eigen::MatrixXd p = covariance * cluster.normal;
     const double expected = p.trace() - p.cwiseProduct(p.transpose()).sum();
-    spread.images.images.add({cluster.score.dot(covariance * cluster.score), expected});
-    for (auto& [number, field] : cluster.fields) {
-      field.score.conservativeResizeLike(Eigen::VectorXd::Zero(n));
-      spread.fields.push_back(
-          {field.score.dot(covariance * field.score), field.leverage, field.rank / static_cast<double>(field.points)});
-    }
+    spread.images.add({cluster.score.dot(covariance * cluster.score), expected});
+    spread.trace += p.trace();
     for (const auto& [unknown, rows] : cluster.rows) {
       const UnknownId& id = plan_.unknowns[at(unknown)].id;
       if (id.kind != UnknownKind::kCamera) continue;
@@ -244,18 +185,11 @@ void ImageClusters::finish(const CovarianceOf& covariance_of, CellSpread& spread
       const Eigen::VectorXd change = with_all * cluster.score;
       const Eigen::MatrixXd mean = p.middleRows(rows.first, rows.count) * with_all.transpose();
       const Eigen::MatrixXd followed = p.middleRows(rows.first, rows.count) * p * with_all.transpose();
-      spread.images.cameras[id.index].add(
+      spread.cameras[id.index].add(
           {change.dot(Eigen::VectorXd(solve_symmetric(own, change))), solve_symmetric(own, mean - followed).trace()});
     }
   }
   clusters_.clear();
-}
-
-ImageSpread CellSpread::sums(double concentration) const {
-  ImageSpread sums = images;
-  for (const Field& field : fields)
-    sums.fields.add({field.squares, field.leverage * (1 - followed_share(concentration, field.leverage, field.rank))});
-  return sums;
 }
 
 }  // namespace megablock

@@ -49,33 +49,20 @@ struct ImageSpread {
     void add(const Sum& other);
     double ratio() const { return expected > 0 && squares > 0 ? squares / expected : 1; }
   };
-  Sum images, fields;
-  std::map<std::int64_t, Sum> cameras;  // of the parameters of each camera of the block, from whole images
+  Sum images;
+  double trace = 0;                     // sum tr P of the images
+  std::map<std::int64_t, Sum> cameras;  // of the parameters of each camera of the block
   void add(const ImageSpread& other);
-  double inflation() const;
-  double ratio() const;  // rho of cluster_scores.h: that of fields with the inflation
+  double ratio() const;     // rho of cluster_scores.h
+  double unshrunk() const;  // g of cluster_scores.h
   // The factor of a camera's empirical covariance that has `reached` times the formal one in the mean.
   double camera_inflation(std::int64_t camera, double reached) const;
   Bytes to_bytes() const;
   static ImageSpread from_bytes(const Bytes& bytes);
 };
-// The same of one cell, where the concentration of the tile is not known yet.
-struct CellSpread {
-  struct Field {
-    double squares = 0, leverage = 0, rank = 0;
-  };
-  ImageSpread images;
-  std::vector<Field> fields;
-  ImageSpread sums(double concentration) const;
-};
-
-// What the clusters of a tile's points need besides its problem (cluster_scores.h).
+// What the clusters of a tile's points need besides its problem (cluster_scores.h): g and rho there.
 struct ClusterWeights {
-  std::vector<std::uint8_t> leverages;  // [points] the trace h in units of 1 / 32; 0 where the point takes no part
-  std::vector<double> extents;          // [cameras] of the part of the images that has observations, px
-  double concentration = 1;             // of the hat matrices of single points
-  double inflation = 1;                 // of the squares of the scores, for errors that whole images share
-  double ratio = 1;                     // rho, of the squares of the scores over those of independent errors
+  double unshrunk = 1, ratio = 1;
 };
 
 // What a sweep adds to a tile besides its observations: the constraints and right-hand sides of the datum of a free
@@ -167,10 +154,7 @@ struct TileCovariance {
   // io/evaluation/reliability.h), for residuals as the loss weights them: 1 - diag(J C J') / sigma^2. NaN for
   // observations that take no part. [observations]
   std::vector<float> redundancy_x, redundancy_y;
-  // tr P^2 over (tr P)^2 / r of single tie points, P their hat matrix of rank r (cluster_scores.h): 1 where all
-  // directions take part alike. From a sample of the points.
-  double concentration = 1;  // both where TileDatum::spread asks for them
-  ImageSpread spread;
+  ImageSpread spread;  // where TileDatum::spread asks for it
   // [points] The further columns (3 x columns), where they were asked for.
   std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> point_columns;
 };

@@ -36,12 +36,9 @@ ObservationKind image_kind(PointRole role) {
                                      : ObservationKind::kTieImage;
 }
 
-constexpr std::int64_t kSampled = 16;  // one in so many points tells the concentration
-
 struct CellStatistics {
   ObservationTable observations;
-  double squares = 0, uniform = 0;  // sums of tr P^2, and of (tr P)^2 / r, over a sample of the points
-  CellSpread spread;
+  ImageSpread spread;
 };
 
 // The contributions of the cells that one thread works on. Each thread writes to places of its own.
@@ -50,7 +47,7 @@ class CellCovariances {
   // `offsets`: first row of each of plan.unknowns in `columns`.
   CellCovariances(const TileProblem& problem, const TilePlan& plan, const TileState& state, const PointTables& tables,
                   const Step& columns, const std::vector<std::int64_t>& offsets, const TileDatum& datum,
-                  const std::vector<double>& extents, TileCovariance& result)
+                  TileCovariance& result)
       : own_share_(datum.clusters == nullptr ? 1 : 1 - kScoreWeight),
         with_ties_(datum.clusters == nullptr),
         problem_(problem),
@@ -62,7 +59,7 @@ class CellCovariances {
         equations_(problem, state, tables),
         frame_sums_(plan.unknowns.size()),
         row_of_unknown_(plan.unknowns.size(), -1) {
-    if (datum.spread > 0) images_.emplace(problem, plan, extents, datum.spread);
+    if (datum.spread > 0) images_.emplace(problem, plan, datum.spread);
   }
 
   // Adds the points and observations of a cell, from the covariance of its unknowns.
@@ -84,9 +81,8 @@ class CellCovariances {
       for (std::size_t i = 0; i < equations_.points().size(); ++i) {
         equations_.blocks(i, blocks_);
         add_point(i);
-        if (images_ && equations_.points()[i].point % kSampled == 0) add_concentration(i, statistics);
         if (columns_.columns > 1) add_point_columns(i);
-        if (images_) images_->add_point(equations_, i, leverage(equations_.points()[i]));
+        if (images_) images_->add_point(equations_, i);
       }
     }
     if (images_)
@@ -122,62 +118,6 @@ class CellCovariances {
     result_.points[at(point.point)] = covariance;
     add_image_redundancy(point, covariance);
     add_prior_redundancy(point.point, covariance);
-  }
-
-  // tr P, from the redundancy numbers. The point itself takes three.
-  double leverage(const PointEquations::Point& point) const {
-    double sum = -3;
-    for (std::int64_t lane = point.first; lane < point.last; ++lane) {
-      const std::size_t row = at(equations_.row_of(lane));
-      sum += 2.0 - result_.redundancy_x[row] - result_.redundancy_y[row];
-    }
-    return std::max(0.0, sum);
-  }
-
-  // P = R C R' with R the Jacobian of the other unknowns after elimination of the point.
-  void add_concentration(std::size_t i, CellStatistics& statistics) {
-    const PointEquations::Point& point = equations_.points()[i];
-    const Eigen::Index rows = 2 * point.observation_count();
-    if (problem_.points[at(point.point)].role != PointRole::kTie || rows < 4) return;
-    std::vector<std::pair<std::int64_t, Eigen::Index>> unknowns;  // with the first column
-    Eigen::Index width = 0;
-    const auto column_of = [&](std::int64_t unknown, Eigen::Index dimension) {
-      for (const auto& [known, column] : unknowns)
-        if (known == unknown) return column;
-      unknowns.emplace_back(unknown, width);
-      return std::exchange(width, width + dimension);
-    };
-    Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(rows, 0), by_point(rows, 3);
-    for (std::int64_t lane = point.first; lane < point.last; ++lane) {
-      const Eigen::Index row = 2 * (lane - point.first);
-      by_point.middleRows<2>(row) = equations_.by_point(lane);
-      const int count = equations_.jacobians(lane, jacobians_);
-      for (int a = 0; a < count; ++a) {
-        const auto& block = jacobians_[at(a)];
-        const Eigen::Index column = column_of(block.unknown, block.jacobian.cols());
-        if (width > jacobian.cols()) {
-          const Eigen::Index known = jacobian.cols();
-          jacobian.conservativeResize(Eigen::NoChange, width);
-          jacobian.rightCols(width - known).setZero();
-        }
-        jacobian.block(row, column, 2, block.jacobian.cols()) = block.jacobian;
-      }
-    }
-    Eigen::MatrixXd covariance(width, width);
-    const auto dimension = [&](std::size_t u) {
-      return (u + 1 < unknowns.size() ? unknowns[u + 1].second : width) - unknowns[u].second;
-    };
-    for (std::size_t a = 0; a < unknowns.size(); ++a)
-      for (std::size_t b = 0; b < unknowns.size(); ++b)
-        covariance.block(unknowns[a].second, unknowns[b].second, dimension(a), dimension(b)) =
-            covariance_of(unknowns[a].first, dimension(a), unknowns[b].first, dimension(b));
-    const Eigen::Matrix3d normal = by_point.transpose() * by_point;
-    jacobian -= by_point * solve_symmetric(normal, by_point.transpose() * jacobian);
-    const Eigen::MatrixXd hat = jacobian * covariance * jacobian.transpose();
-    const double trace = hat.trace();
-    if (!(trace > 0)) return;
-    statistics.squares += hat.squaredNorm();
-    statistics.uniform += trace * trace / static_cast<double>(rows - 3);
   }
 
   void add_image_redundancy(const PointEquations::Point& point, const Eigen::Matrix3d& covariance) {
@@ -288,10 +228,8 @@ class TileCovarianceBuilder {
         factor_(factor),
         offsets_(row_offsets(plan.unknowns)),
         tables_(problem, plan, state),
-        extents_(observed_extents(problem)),
         cells_([&, this] {
-          return std::make_unique<CellCovariances>(problem, plan, state, tables_, columns, offsets_, datum, extents_,
-                                                   result_);
+          return std::make_unique<CellCovariances>(problem, plan, state, tables_, columns, offsets_, datum, result_);
         }) {
     if (columns.columns > 1)
       result_.point_columns.assign(problem.points.size(), Eigen::MatrixXd::Zero(3, columns.columns - 1));
@@ -324,14 +262,10 @@ class TileCovarianceBuilder {
       return covariance;
     });
     // The tables are added in the order of the cells, so that the bits do not depend on the threads.
-    double squares = 0, uniform = 0;
     for (const CellStatistics& cell : cells) {
       result_.observations.add(cell.observations);
-      squares += cell.squares;
-      uniform += cell.uniform;
+      result_.spread.add(cell.spread);
     }
-    if (uniform > 0) result_.concentration = std::max(1.0, squares / uniform);
-    for (const CellStatistics& cell : cells) result_.spread.add(cell.spread.sums(result_.concentration));
     return std::move(result_);
   }
 
@@ -379,7 +313,6 @@ class TileCovarianceBuilder {
   std::vector<std::int64_t> offsets_;
   std::vector<std::int64_t> frame_of_, camera_of_, mount_of_;
   PointTables tables_;
-  std::vector<double> extents_;
   PerThread<CellCovariances> cells_;
   TileCovariance result_;
 };

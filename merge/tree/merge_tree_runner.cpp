@@ -91,7 +91,7 @@ TileDatum MergeTreeRunner::datum_of(std::size_t row) const {
   const RankTile& tile = tiles_.outline(row);
   TileDatum datum = tile_datum(gauge_, tile.tile, tile.problem, tile_plans_[row], tile.state, columns_);
   datum.spread = with_scores_ ? 0 : spread_share_;
-  if (with_scores_) datum.clusters = &cluster_weights_[row];
+  if (with_scores_) datum.clusters = &cluster_weights_;
   if (columns_ == DatumColumns::kFrames) datum.columns = unit_columns(block_frames_, tile_plans_[row]);
   return datum;
 }

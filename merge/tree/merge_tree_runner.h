@@ -194,12 +194,12 @@ class MergeTreeRunner : public TreeRunner {
   std::vector<std::int64_t>
       sent_subtrees_;  // recorded subtrees of this sweep whose update has left this rank's own subtrees
   BlockGauge gauge_;
-  HeldAgainstPriors held_before_;                // of the last sweep up
-  std::vector<ClusterWeights> cluster_weights_;  // [tiles_] of the last posterior()
-  double spread_share_ = 0;                      // 0: no scored_posterior() follows
-  bool with_scores_ = false;                     // the sweep adds the scores of clusters
-  DatumColumns columns_ = DatumColumns::kNone;   // the further right-hand sides of the sweep
-  UnknownList block_frames_;                     // of the whole block, where columns_ is kFrames
+  HeldAgainstPriors held_before_;               // of the last sweep up
+  ClusterWeights cluster_weights_;              // of the last posterior()
+  double spread_share_ = 0;                     // 0: no scored_posterior() follows
+  bool with_scores_ = false;                    // the sweep adds the scores of clusters
+  DatumColumns columns_ = DatumColumns::kNone;  // the further right-hand sides of the sweep
+  UnknownList block_frames_;                    // of the whole block, where columns_ is kFrames
   bool check_seams_ = false;
   bool posterior_expected_ = false;
   std::optional<SubtreeSums> last_sweep_;  // sums of a sweep at the present state that stored the data of the posterior

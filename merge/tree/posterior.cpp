@@ -72,7 +72,6 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
   std::vector<TileCheck> checks(tiles_.size());
   std::vector<ObservationTable> tables(tiles_.size());
   std::vector<ImageSpread> spreads(tiles_.size());
-  cluster_weights_.assign(tiles_.size(), {});
   std::size_t last = 0;
   covariances_down(
       [&](std::size_t row, const NodeFactors& factors, const CovarianceMatrix& separator) {
@@ -82,7 +81,6 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
       [&](const RankTile& tile, const TileCovariance& covariance) {
         tables[last] = covariance.observations;
         spreads[last] = covariance.spread;
-        if (spread_share_ > 0) cluster_weights_[last] = cluster_weights(tile.problem, covariance);
         if (visit) visit(tile, covariance);
       });
   check_seams_ = false;
@@ -94,10 +92,7 @@ MergeTreeRunner::Posterior MergeTreeRunner::posterior(const VisitCovariance& vis
     posterior.observations.add(table);
   for (const ImageSpread& spread : gather_by_tile(ranks_, plan_.node_of_leaf.size(), tiles_, spreads))
     posterior.spread.add(spread);
-  for (ClusterWeights& weights : cluster_weights_) {
-    weights.inflation = posterior.spread.inflation();
-    weights.ratio = posterior.spread.ratio();
-  }
+  cluster_weights_ = cluster_weights(posterior.spread);
 
   // Each rank knows the seams of its own nodes; all get all of them, in the order of the nodes.
   ByteWriter writer;

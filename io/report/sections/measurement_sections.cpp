@@ -188,8 +188,8 @@ std::string accuracy_section(const BlockResult& result, const Figures& f, const 
                 (result.sigma_scaled ? "all multiplied by σ₀ a posteriori."
                                      : "for σ₀ = 1; only those of the last column are multiplied by σ₀ a posteriori.") +
                 " Rotation: the largest of the three axes." + about_datum(result) +
-                (both ? " Empirical sigmas follow from the residuals of neighbouring tie points, whose errors may be "
-                        "alike; the formal ones take all observations as independent."
+                (both ? " Empirical sigmas follow from the residuals of the tie points of each image, whose errors may "
+                        "be alike; the formal ones take all observations as independent."
                       : "")) +
           table.html("compact") + ellipses_figure(result, f, after_reading));
 }

@@ -18,8 +18,10 @@ TEST(Half, EveryTrackIsInOneHalfTogetherWithThoseOfItsImage) {
   for (ImageIndex image(0); image.value < 10000; ++image.value) {
     const bool one = takes_track({Half::kTiePoints1}, image);
     EXPECT_NE(one, takes_track({Half::kTiePoints2}, image));
+    const ImageIndex before(image.value - 1), after(image.value + 1);
     if (image.value % 2 == 1) {
-      EXPECT_NE(one, takes_track({Half::kTiePoints1}, ImageIndex(image.value - 1)));
+      EXPECT_NE(one, takes_track({Half::kTiePoints1}, before));
+      EXPECT_NE(takes_track({Half::kTiePoints1, 1}, image), takes_track({Half::kTiePoints1, 1}, after));
     }
     EXPECT_TRUE(takes_track({Half::kNone}, image) && takes_track({Half::kImages1}, image));
     first += one && image.value % 2 == 0;
