@@ -7,7 +7,7 @@
 // s_c s_c' with the score s_c of a cluster, and residuals give an estimate of each (Liang and Zeger 1986, Biometrika
 // 73(1); White 1980 for single observations; Cameron and Miller 2015 for the practice):
 //
-//     C_e = H^-1 B H^-1,   B = sum g_c s_c s_c'.
+//     C_e = H^-1 B H^-1,   B = g sum s_c s_c'.
 //
 // The tree has only inverses of matrices with the structure of H. But C_e is a derivative of one:
 //
