@@ -4,7 +4,7 @@
 // Residuals, each divided by its sigma (r is dimensionless; cost F = 1/2 sum rho(|r|^2)):
 //   image            project(K, to_camera(frame, mount, X)) - measured                                   [2]
 //   position         C + R' lever_arm - P                  (lever arm and R_prior corrected by the       [3]
-//   attitude         Log(R R_prior')                        receiver, io/block/observed_poses.h)               [3]
+//   attitude         Log(R R_prior')                        receiver, io/block/observed_poses.h)         [3]
 //   relative pose    Log(R_to R_from' R_measured'), R_from (C_to - C_from) - T_measured                  [3 + 3]
 //   point prior      X - X_0                               (control points)                              [3]
 //   intrinsics prior k - k_0                               (per parameter with finite sigma)             [1 each]

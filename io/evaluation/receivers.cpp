@@ -180,20 +180,6 @@ std::vector<ReceiverFigures> receivers_of(const BlockResult& result) {
   return receivers;
 }
 
-std::string receiver_text(const ReceiverFigures& receiver) {
-  std::string text;
-  if (!receiver.lever_arm_sigma.isZero())
-    text = fmt::format("lever arm {} m (sigma {} m), {:.3f} m from the given one",
-                       axis_texts(receiver.lever_arm, receiver.lever_arm_sigma, 3),
-                       axis_texts(receiver.lever_arm_sigma, receiver.lever_arm_sigma, 3),
-                       receiver.lever_arm_change.norm());
-  if (!receiver.boresight_sigma.isZero())
-    text += fmt::format("{}boresight {} degrees (sigma {} degrees)", text.empty() ? "" : "; ",
-                        axis_texts(receiver.boresight, receiver.boresight_sigma, 4),
-                        axis_texts(receiver.boresight_sigma, receiver.boresight_sigma, 4));
-  return text;
-}
-
 std::vector<std::string> receiver_remarks(const BlockResult& result, const report::Figures& figures) {
   std::vector<std::string> lines;
   const auto positions = by_rig(

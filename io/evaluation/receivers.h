@@ -9,8 +9,8 @@
 // with c the error of the lever arm or boresight, which moves with the rig, and g a shift or turn of the datum, which
 // stays with the ground. Both are estimated in least squares over the frames of a rig; differences of more than 3.5
 // times the usual are left out and the rest is solved again, twice. Where all frames look the same way, c and g cannot
-// be told apart, and c is not known; of cameras that all look down, this is true along their axis. An error is named where
-// it is larger than five of its sigmas, than the stated sigma, and than what remains of the differences.
+// be told apart, and c is not known; of cameras that all look down, this is true along their axis. An error is named
+// where it is larger than five of its sigmas, than the stated sigma, and than what remains of the differences.
 #pragma once
 
 #include <Eigen/Core>
@@ -31,9 +31,6 @@ struct ReceiverFigures {
   Eigen::Vector3d boresight = Eigen::Vector3d::Zero(), boresight_sigma = Eigen::Vector3d::Zero();
 };
 std::vector<ReceiverFigures> receivers_of(const BlockResult& result);
-
-// "lever arm 0.102, -0.601, -0.203 m (sigma 0.004, 0.004, 0.006 m), 0.31 m from the given one; boresight ...".
-std::string receiver_text(const ReceiverFigures& receiver);
 
 // One line for each rig whose antenna or attitudes are off by one vector of the rig, with the option that estimates it.
 std::vector<std::string> receiver_remarks(const BlockResult& result, const report::Figures& figures);

@@ -152,8 +152,8 @@ TEST(Receivers, AreShownWithTheGivenLeverArm) {
   ASSERT_EQ(receivers.size(), 1u);
   EXPECT_TRUE(receivers[0].lever_arm.isApprox(Eigen::Vector3d(0.3, -0.6, 0)));
   EXPECT_TRUE(receivers[0].boresight_sigma.isZero());
-  EXPECT_EQ(receiver_text(receivers[0]),
-            "lever arm 0.300, -0.600, 0.000 m (sigma 0.010, 0.010, 0.010 m), 0.200 m from the given one");
+  EXPECT_TRUE(receivers[0].lever_arm_change.isApprox(Eigen::Vector3d(0.2, 0, 0)));
+  EXPECT_TRUE(receivers[0].lever_arm_sigma.isApprox(Eigen::Vector3d::Constant(0.01)));
 }
 
 }  // namespace
