@@ -25,10 +25,12 @@ void add_residual(const Eigen::Vector3d& residual, const Eigen::Vector3d& sigma,
 
 }  // namespace
 
-void LengthCounts::add(double length) {
+std::size_t LengthCounts::bin_of(double length) {
   const double bin = length > 0 ? kBinsPerDoubling * (std::log2(length) - kFirstBin) : 0;
-  ++counts_[static_cast<std::size_t>(std::clamp(bin, 0.0, kBins - 1.0))];
+  return static_cast<std::size_t>(std::clamp(bin, 0.0, kBins - 1.0));
 }
+
+void LengthCounts::add(double length) { ++counts_[bin_of(length)]; }
 
 void LengthCounts::add(const LengthCounts& other) {
   for (std::size_t i = 0; i < counts_.size(); ++i) counts_[i] += other.counts_[i];
@@ -43,6 +45,11 @@ double LengthCounts::median() const {
   std::size_t bin = 0;
   while ((below += counts_[bin]) < half) ++bin;
   return std::exp2((static_cast<double>(bin) + 0.5) / kBinsPerDoubling + kFirstBin);
+}
+
+bool LengthCounts::any_above(double length) const {
+  return std::any_of(counts_.begin() + static_cast<std::ptrdiff_t>(bin_of(length)) + 1, counts_.end(),
+                     [](std::int64_t count) { return count > 0; });
 }
 
 void PriorLengths::add(const PriorLengths& other) {

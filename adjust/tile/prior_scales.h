@@ -31,9 +31,11 @@ class LengthCounts {
   void add(double length);  // in sigmas
   void add(const LengthCounts& other);
   std::int64_t total() const;
-  double median() const;  // middle of its bin; 0 where nothing was counted
+  double median() const;                // middle of its bin; 0 where nothing was counted
+  bool any_above(double length) const;  // in a bin above that of the length
 
  private:
+  static std::size_t bin_of(double length);
   static constexpr int kBins = 200;  // eight for each doubling, from 1/32 to 2^20 sigmas
   std::array<std::int64_t, kBins> counts_{};
 };

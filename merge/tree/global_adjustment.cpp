@@ -77,6 +77,14 @@ GlobalState start_global(const GlobalOptions& options) {
   return state;
 }
 
+GlobalState start_again(const GlobalState& before, const GlobalOptions& options) {
+  GlobalState state = start_global(options);
+  state.lambda = state.sweep_lambda = std::min(state.lambda, before.lambda);
+  state.accepted = before.accepted;
+  state.held = before.held;
+  return state;
+}
+
 void report_up(GlobalState& state, const GlobalOptions& options, const UpReport& report) {
   state.held = std::max(state.held % 4, report.held.rotations) + (state.held >= 4 || report.held.scale ? 4 : 0);
   state.cost = report.sums.cost;

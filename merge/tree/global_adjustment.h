@@ -13,7 +13,9 @@
 //
 // Damping follows Nielsen (1999): lambda *= max(1/3, 1 - (2 rho - 1)^3) on acceptance, without a floor; on rejection
 // lambda *= max(10 nu, 1e-6 / lambda) and nu *= 2. The tiles are adjusted and aligned beforehand, so lambda starts at
-// 1e-10. The first rejection therefore raises lambda to 1e-6 at once.
+// 1e-10. The first rejection therefore raises lambda to 1e-6 at once. Control of a metre tells the rotation of a block
+// of forty images 1e-11 times as well as their observations tell those of the frames. Even 1e-10 then holds this
+// rotation back, so that a further adjustment begins with the damping that the one before has reached.
 //
 // A sweep up takes the curvature of the robust losses (tile_linearisation.h) while steps decrease the cost as
 // predicted: after a step of gain ratio >= 0.75, until a step has a smaller one or is rejected.
@@ -99,6 +101,9 @@ struct GlobalState {
 };
 
 GlobalState start_global(const GlobalOptions& options);
+// Another adjustment of the same block, after the weights of its observations have changed. It keeps the number of
+// accepted steps, what sweeps have held, and a damping that has fallen below that of the options.
+GlobalState start_again(const GlobalState& before, const GlobalOptions& options);
 inline GlobalAction next_action(const GlobalState& state) { return state.next; }
 inline Sweep next_sweep(const GlobalState& state) {
   return {state.sweep_lambda, state.sweep_curvature != 0, {state.held % 4, state.held >= 4}};

@@ -93,16 +93,16 @@ void clear_scratch(const Job& job, bool use) {
 
 // Only the last round iterates to the end. The rounds before it only lead to decisions on observations and to sigmas. A
 // mean of a hundredth of a sigma of the frames' unknowns is enough for these: chi-square is then off by 1e-4 of their
-// number. A round between the first and the last starts near its end. Where it does not get there in a few iterations,
-// most positions or control points are beyond the corners of their losses, and larger sigmas are what it needs.
+// number. A round between the first and the last starts near its end. Where two iterations do not get there, most positions
+// or control points are beyond the corners of their losses, and larger sigmas are what it needs.
 GlobalOptions options_of(const MergeSettings& settings, std::size_t frames, bool near, bool last) {
   constexpr double kSettled = 0.01;
-  constexpr int kFew = 4;
+  constexpr int kMostBetween = 2;
   const double settled = kSettled * std::sqrt(6 * static_cast<double>(frames));
   GlobalOptions options;
   options.max_decrement = last ? settings.decrement : std::max(settings.decrement, settled);
   options.confirm = last;
-  options.max_iterations = near && !last ? std::min(kFew, settings.max_iterations) : settings.max_iterations;
+  options.max_iterations = near && !last ? std::min(kMostBetween, settings.max_iterations) : settings.max_iterations;
   return options;
 }
 
@@ -143,17 +143,18 @@ BlockState load_block(const Job& job, MergeInputs& inputs, const MergeCheckpoint
 // Begins the next adjustment of the block, in the round that `position` gives.
 void begin_adjustment(MergePosition& position, const GlobalOptions& options) {
   position.tried_steps += position.global.iterations;
-  const std::int32_t accepted = position.global.accepted, held = position.global.held;
-  position.global = start_global(options);
-  position.global.accepted = accepted;
-  position.global.held = held;
+  position.global = start_again(position.global, options);
 }
 
-// Whether positions and control points are tested before the last round: where gross errors are sought, and where a
-// block with scaled sigmas does not converge, from which a gross error may keep it for long.
-bool asks_for_tests(const MergePosition& position, bool converged) {
+// Whether positions and control points are tested before the last round: where gross errors are sought, where a block
+// with scaled sigmas does not converge, from which a gross error may keep it for long, and where the sigmas have
+// settled with a control point far off, because the iterations to the end would be for nothing. The tests cost as much
+// as two iterations.
+bool asks_for_tests(const Job& job, const MergePosition& position, bool converged, bool scaled, bool rescaled,
+                    TileStore& tiles) {
   if (position.near == 0) return position.gross_errors == MergePosition::kSought;
-  return !converged && position.gross_errors == MergePosition::kNotSought && position.scales.matter();
+  if (position.gross_errors != MergePosition::kNotSought) return false;
+  return (!converged && scaled) || (!rescaled && control_seems_wrong(job, tiles));
 }
 
 // Begins from afar again, because a gross error bends the block, until good observations seem wrong.
@@ -229,15 +230,17 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
       say_costs(job, adjusted.costs);
       break;
     }
-    if (asks_for_tests(position, adjusted.converged) && judge_priors(job, test_priors(runner), tiles, position)) {
+    const bool scaled = position.scales.matter();
+    const bool rescaled =
+        near && job.settings.merge.scale_contradicted_sigmas && adopt_contradicted_scales(job, tiles, position.scales);
+    if (asks_for_tests(job, position, adjusted.converged, scaled, rescaled, tiles) &&
+        judge_priors(job, test_priors(runner), tiles, position)) {
       begin_again(position, options);
       checkpoint.write(position, tiles, block);
       continue;
     }
-    bool changed = adopt_image_sigma(job, tiles, rank_of_tile.size(), block);
+    bool changed = adopt_image_sigma(job, tiles, rank_of_tile.size(), block) || rescaled;
     if (job.settings.merge.estimate_sigmas) changed = adopt_sigma_scales(runner, tiles, position.scales) || changed;
-    if (job.settings.merge.scale_contradicted_sigmas && near)
-      changed = adopt_contradicted_scales(job, tiles, position.scales) || changed;
     changed = screen(job, tiles) > 0 || changed;
     if (!near) {
       ++position.rounds_afar;

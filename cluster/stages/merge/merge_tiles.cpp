@@ -120,21 +120,32 @@ void multiply_sigmas(const SigmaScales& change, TileStore& tiles, SigmaScales& s
     tiles.change(row, [&](RankTile& tile) { scale_sigmas(tile.problem, change); });
 }
 
-}  // namespace
-
-bool adopt_contradicted_scales(const Job& job, TileStore& tiles, SigmaScales& scales) {
-  constexpr double kSettled = 1.2;  // a smaller change needs no further adjustment: a median of few is no better
+PriorLengths gather_lengths(const Job& job, TileStore& tiles) {
   PriorLengths lengths;
   for (std::size_t row = 0; row < tiles.size(); ++row) {
     const RankTile& tile = tiles.whole(row);
     lengths.add(prior_lengths(tile.problem, tile.state));
   }
-  // Those have factors from variance components.
-  if (job.settings.merge.estimate_sigmas) lengths.position_horizontal = lengths.position_height = {};
   ByteWriter writer;
   writer.value(lengths);
   PriorLengths all;
   for (const Bytes& bytes : job.ranks.gather_all(writer.take())) all.add(ByteReader(bytes).value<PriorLengths>());
+  return all;
+}
+
+}  // namespace
+
+bool control_seems_wrong(const Job& job, TileStore& tiles) {
+  constexpr double kFarOff = 3;  // sigmas
+  const PriorLengths lengths = gather_lengths(job, tiles);
+  return lengths.control_horizontal.any_above(kFarOff) || lengths.control_height.any_above(kFarOff);
+}
+
+bool adopt_contradicted_scales(const Job& job, TileStore& tiles, SigmaScales& scales) {
+  constexpr double kSettled = 1.2;  // a smaller change needs no further adjustment: a median of few is no better
+  PriorLengths all = gather_lengths(job, tiles);
+  // Those have factors from variance components.
+  if (job.settings.merge.estimate_sigmas) all.position_horizontal = all.position_height = {};
   const SigmaScales change = contradicted_sigma_scales(scales, all);
   if (std::ranges::all_of(change.of, [](double f) { return f < kSettled && f > 1 / kSettled; })) return false;
   multiply_sigmas(change, tiles, scales);

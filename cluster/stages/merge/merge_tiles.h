@@ -47,6 +47,9 @@ bool adopt_contradicted_scales(const Job& job, TileStore& tiles, SigmaScales& sc
 // adjustment is needed.
 bool adopt_sigma_scales(MergeTreeRunner& runner, TileStore& tiles, SigmaScales& scales);
 
+// Collective. Whether some control point is far off the block.
+bool control_seems_wrong(const Job& job, TileStore& tiles);
+
 // Collective. The tests of the positions and control points of this rank's tiles at the solution.
 PriorTests test_priors(MergeTreeRunner& runner);
 

@@ -39,6 +39,17 @@ TEST(LengthCounts, MedianIsThatOfTheLengths) {
   EXPECT_EQ(LengthCounts().median(), 0);
 }
 
+TEST(LengthCounts, KnowWhetherAnyIsLarger) {
+  LengthCounts counts;
+  EXPECT_FALSE(counts.any_above(0));
+  for (const double length : {0.0, 1e-9, 0.5, 2.6}) counts.add(length);
+  EXPECT_TRUE(counts.any_above(2));
+  EXPECT_FALSE(counts.any_above(3));
+  EXPECT_FALSE(counts.any_above(1e12));
+  counts.add(1e12);
+  EXPECT_TRUE(counts.any_above(1e3));
+}
+
 // Positions that are ten times worse than stated, and one control point that is far off.
 TEST(PriorScales, FollowFromTheResidualsOfMost) {
   SimulatedBlock simulated = simulate_block(with_control());

@@ -328,6 +328,25 @@ TEST(GlobalController, TakesTheCurvatureOfTheLossesWhileItsModelHolds) {
   EXPECT_FALSE(next_sweep(state).curvature);
 }
 
+TEST(GlobalController, BeginsAgainWithTheDampingThatItHasReached) {
+  GlobalState fallen = after({}, {{1e9, 3.0}, {1e9 - 4.5, 1.0}, {1e9 - 5, 0.1}});
+  ASSERT_EQ(fallen.accepted, 2);
+  ASSERT_LT(fallen.lambda, 2e-11);
+  fallen.held = 5;
+  const GlobalState again = start_again(fallen, {});
+  EXPECT_EQ(next_sweep(again).lambda, fallen.lambda);
+  EXPECT_EQ(again.lambda, fallen.lambda);
+  EXPECT_EQ(again.accepted, 2);
+  EXPECT_EQ(again.held, 5);
+  EXPECT_EQ(again.iterations, 0);
+  EXPECT_EQ(again.outcome, GlobalOutcome::kRunning);
+  EXPECT_EQ(next_action(again), GlobalAction::kUp);
+
+  const GlobalState raised = after({}, {{1e9, 3.0}, {2e9, 3.0}});  // a step that is rejected
+  ASSERT_GE(raised.lambda, 1e-6 * (1 - 1e-12));
+  EXPECT_EQ(next_sweep(start_again(raised, {})).lambda, GlobalOptions().initial_lambda);
+}
+
 // Without confirmation a pass may stop, unless damping makes its decrement small.
 TEST(GlobalController, StopsUnconfirmedWhereItIsHardlyDamped) {
   GlobalOptions options;
