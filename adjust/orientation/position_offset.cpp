@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "adjust/orientation/steps/control_marks.h"
 #include "geometry/numbers/median.h"
 #include "io/block/held_priors.h"
 #include "io/block/observed_poses.h"
+#include "io/text/side_text.h"
 
 namespace megablock {
 
@@ -18,7 +20,6 @@ namespace {
 constexpr std::size_t kFewestPoints = 3;
 constexpr double kOfOwnSigma = 3, kOfPosition = 5, kOfScatter = 3;  // times these an offset counts
 constexpr double kNormal = 1.4826, kOfMedian = 1.2533;              // sigma over median of |r|; sigma of a median
-constexpr double kControlDecides = 3;                               // sigmas of the offset
 constexpr double kKnown = kUnknownHeightSigma / 2;                  // metres
 
 bool has_position(const Block& block, const BlockState& state, FrameIndex frame) {
@@ -34,20 +35,16 @@ struct Difference {
   double offset = 0, scatter = 0, sigma = 0;
 };
 
-// The median, and its sigma where each difference has at least `least_sigma`.
-Difference median_difference(const std::vector<double>& differences, double least_sigma) {
-  Difference found;
-  found.offset = median(differences);
-  std::vector<double> rest;
-  for (const double d : differences) rest.push_back(std::abs(d - found.offset));
-  found.scatter = kNormal * median(std::move(rest));
-  found.sigma = kOfMedian * std::max(found.scatter, least_sigma) / std::sqrt(static_cast<double>(differences.size()));
-  return found;
-}
-
+// The median of the differences, and its sigma where each has at least that of the control.
 Difference difference_of(const Comparison& c, double focal_share) {
-  Difference found = median_difference(c.differences, median(c.control_sigmas));
-  found.sigma = std::hypot(found.sigma, median(c.views) * focal_share);
+  Difference found;
+  found.offset = median(c.differences);
+  std::vector<double> rest;
+  for (const double d : c.differences) rest.push_back(std::abs(d - found.offset));
+  found.scatter = kNormal * median(std::move(rest));
+  const double of_one = std::max(found.scatter, median(c.control_sigmas));
+  found.sigma = std::hypot(kOfMedian * of_one / std::sqrt(static_cast<double>(c.differences.size())),
+                           median(c.views) * focal_share);
   return found;
 }
 
@@ -70,20 +67,6 @@ Eigen::Vector3d mean_centre(const std::vector<PointView>& marks) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const PointView& mark : marks) sum += mark.camera.centre;
   return sum / static_cast<double>(marks.size());
-}
-
-// "46.90 m above", "2.00 m west of and 3.00 m below".
-std::string where_of(const Eigen::Vector3d& offset) {
-  constexpr std::array<std::array<const char*, 2>, 3> kSides{
-      {{"east of", "west of"}, {"north of", "south of"}, {"above", "below"}}};
-  std::vector<std::string> parts;
-  for (int k = 0; k < 3; ++k)
-    if (offset[k] != 0)
-      parts.push_back(
-          fmt::format("{:.2f} m {}", std::abs(offset[k]), kSides[static_cast<std::size_t>(k)][offset[k] < 0 ? 1 : 0]));
-  std::string where = parts.front();
-  for (std::size_t i = 1; i < parts.size(); ++i) where += (i + 1 == parts.size() ? " and " : ", ") + parts[i];
-  return where;
 }
 
 }  // namespace
@@ -116,72 +99,64 @@ std::optional<PositionOffset> find_position_offset(const Block& block, const Blo
   PositionOffset found;
   for (int k = 0; k < 3; ++k) {
     const auto axis = static_cast<std::size_t>(k);
-    const auto count = static_cast<double>(position_sigmas[axis].size());
     if (compared[axis].differences.size() < kFewestPoints || position_sigmas[axis].empty()) continue;
     const Difference d = difference_of(compared[axis], focal_share);
-    const double sigma = median(position_sigmas[axis]);
-    if (!counts(d, sigma)) continue;
+    if (!counts(d, median(position_sigmas[axis]))) continue;
     found.offset[k] = d.offset;
     found.sigma[k] = d.sigma;
-    found.before[k] = sigma;
-    found.after[k] = std::hypot(sigma, kControlDecides * d.sigma * std::sqrt(count));
     found.points = std::max(found.points, std::ssize(compared[axis].differences));
   }
   if (found.offset.isZero(0)) return std::nullopt;
   return found;
 }
 
-void remove_offset(const PositionOffset& offset, const std::vector<FrameIndex>& frames,
-                   IndexedVector<FrameIndex, Frame>& positions, BlockState& state) {
+void shift_positions(const PositionOffset& offset, const std::vector<FrameIndex>& frames, Block& block,
+                     BlockState& state) {
+  std::vector<FrameIndex> alone;  // without a group
+  std::set<RigIndex> groups;
   for (const FrameIndex frame : frames) {
     if (state.oriented[frame]) state.frames[frame].centre -= offset.offset;
-    auto& prior = positions[frame].position_prior;
+    const auto& prior = block.frames[frame].position_prior;
     if (!prior) continue;
-    prior->position -= offset.offset;
-    const Eigen::Vector3d raised = (offset.after.cwiseAbs2() - offset.before.cwiseAbs2()).cwiseMax(0);
-    prior->sigma = (prior->sigma.cwiseAbs2() + raised).cwiseSqrt();
+    if (prior->group.valid())
+      groups.insert(prior->group);
+    else
+      alone.push_back(frame);
   }
+  const Eigen::Matrix<std::uint8_t, 3, 1> axes = (offset.offset.array() != 0).cast<std::uint8_t>();
+  for (const RigIndex group : groups) {
+    block.rigs[group].mounts.front().pose.centre += offset.offset;
+    state.mounts[group].front().centre += offset.offset;
+  }
+  for (const FrameIndex frame : frames)
+    if (auto& prior = block.frames[frame].position_prior; prior && prior->group.valid())
+      prior->shifted = prior->shifted.cwiseMax(axes);
+  if (!alone.empty()) add_position_group(alone, offset.offset, axes, block, state);
 }
 
-PositionOffset adjusted_offset(const MovedPositions& moved, const Block& block, const BlockState& adjusted,
-                               const IndexedVector<FrameIndex, Eigen::Vector3d>& variances) {
-  PositionOffset found = moved.offset;
-  std::array<std::vector<double>, 3> differences, own;  // given minus adjusted; variances
-  for (const FrameIndex frame : moved.frames) {
-    if (!has_position(block, adjusted, frame)) continue;
-    const RigIndex rig = block.frames[frame].rig;
-    const Eigen::Vector3d d = difference(
-        adjusted.frames[frame], corrected(*block.frames[frame].position_prior, block.rigs[rig], adjusted.mounts[rig]));
-    for (std::size_t k = 0; k < 3; ++k) {
-      differences[k].push_back(-d[static_cast<int>(k)]);
-      own[k].push_back(variances[frame][static_cast<int>(k)]);
-    }
+void add_position_group(const std::vector<FrameIndex>& frames, const Eigen::Vector3d& offset,
+                        const Eigen::Matrix<std::uint8_t, 3, 1>& axes, Block& block, BlockState& state) {
+  constexpr double kLoose = 10;  // lengths of the offset: its sigma shall tell nothing
+  const RigIndex group = block.rigs.next_index();
+  for (const FrameIndex frame : frames) {
+    PositionPrior& prior = *block.frames[frame].position_prior;
+    prior.group = group;
+    prior.shifted = axes;
   }
-  for (int k = 0; k < 3; ++k) {
-    const auto axis = static_cast<std::size_t>(k);
-    if (found.offset[k] == 0 || differences[axis].empty()) continue;
-    const Difference d = median_difference(differences[axis], 0);
-    found.offset[k] += d.offset;
-    found.sigma[k] = std::sqrt(d.sigma * d.sigma + median(own[axis]));
-  }
-  return found;
+  std::string name = block.frames[frames.front()].name;
+  if (frames.size() > 1) name += fmt::format(" and {} more", frames.size() - 1);
+  block.rigs.push_back(position_group("positions of " + name, offset, kLoose * offset.norm()));
+  state.mounts.push_back({block.rigs[group].mounts.front().pose});
 }
 
 std::string offset_text(const PositionOffset& found) {
   const bool of_heights = found.offset.head<2>().isZero(0);
   return fmt::format(
-      "the positions lie {} the control points (sigma {:.2f} m, {} points): {}; they are moved onto the control, and "
-      "their sigmas are raised from {:.2g} to {:.2g} m, so that they do not count the control a second time "
-      "('orientation: {{move_positions_to_control: false}}' leaves them)",
-      where_of(found.offset), found.sigma.maxCoeff(), found.points,
+      "the positions lie {} the control points (sigma {:.2f} m, {} points): {}; their shift is an unknown of the "
+      "adjustment ('orientation: {{shift_positions: false}}' leaves them), and the control gives the datum",
+      side_text(found.offset), found.sigma.maxCoeff(), found.points,
       of_heights ? "ellipsoidal and orthometric heights, or local control about another origin?"
-                 : "coordinates of two systems?",
-      found.before.maxCoeff(), found.after.maxCoeff());
-}
-
-std::string adjusted_offset_text(const PositionOffset& found) {
-  return fmt::format("in the adjusted block the positions lie {} the control points (sigma {:.2g} m)",
-                     where_of(found.offset), found.sigma.maxCoeff());
+                 : "coordinates of two systems?");
 }
 
 }  // namespace megablock

@@ -101,7 +101,7 @@ struct TileProblem {
   struct PositionTerm {
     LocalFrame frame;
     PositionPrior prior;
-    std::int32_t receiver = -1;  // row of `mounts`; -1: none
+    std::int32_t receiver = -1, group = -1;  // rows of `mounts`; -1: none
   };
   struct AttitudeTerm {
     LocalFrame frame;

@@ -36,7 +36,7 @@ class Attitudes final : public ObservationType {
   std::size_t count(const TileProblem& problem) const override { return problem.attitudes.size(); }
   TermUnknowns unknowns(const TileProblem& problem, std::size_t row) const override {
     TermUnknowns unknowns{{problem.attitudes[row].frame.value}, 1};
-    unknowns.mount = problem.attitudes[row].receiver;
+    unknowns.mounts[0] = problem.attitudes[row].receiver;
     return unknowns;
   }
   void linearise(const TileProblem& problem, const TileState& state, std::size_t row,

@@ -101,6 +101,13 @@ class TileBuilder {
         block_.rigs[rig].has_receiver() && has_prior(block_.frames[frame]) && tiles_.tile_of_frame[frame] == tile_;
     return any ? receiver_id(block_, rig) : MountId{rig, -1};
   }
+  // The group of the position of a frame in this tile; mount -1: none.
+  MountId group_of(FrameIndex frame) const {
+    const auto& prior = block_.frames[frame].position_prior;
+    const bool any =
+        options_.use_position_priors && prior && prior->group.valid() && tiles_.tile_of_frame[frame] == tile_;
+    return any ? receiver_id(block_, prior->group) : MountId{{}, -1};
+  }
   const FrameMeasurement& measured(const std::string& key, std::size_t row) const {
     return block_.frame_measurements.at(key)[row];
   }
@@ -155,7 +162,8 @@ class TileBuilder {
     }
     make_distinct(frames);
     for (const FrameIndex frame : frames)
-      if (const MountId receiver = receiver_of(frame); receiver.mount >= 0) problem_.mounts.push_back(receiver);
+      for (const MountId id : {receiver_of(frame), group_of(frame)})
+        if (id.mount >= 0) problem_.mounts.push_back(id);
     make_distinct(problem_.cameras);
     make_distinct(problem_.mounts);
 
@@ -247,10 +255,10 @@ class TileBuilder {
       if (tiles_.tile_of_frame[problem_.frames[f]] != tile_) continue;
       const Frame& frame = block_.frames[problem_.frames[f]];
       const LocalFrame local(static_cast<std::int32_t>(f));
-      const MountId id = receiver_of(problem_.frames[f]);
-      const std::int32_t receiver = id.mount < 0 ? -1 : row_of(problem_.mounts, id);
+      const auto mount_row = [&](const MountId& id) { return id.mount < 0 ? -1 : row_of(problem_.mounts, id); };
+      const std::int32_t receiver = mount_row(receiver_of(problem_.frames[f]));
       if (options_.use_position_priors && frame.position_prior)
-        problem_.positions.push_back({local, *frame.position_prior, receiver});
+        problem_.positions.push_back({local, *frame.position_prior, receiver, mount_row(group_of(problem_.frames[f]))});
       if (options_.use_attitude_priors && frame.attitude_prior)
         problem_.attitudes.push_back({local, *frame.attitude_prior, receiver});
     }
@@ -400,10 +408,13 @@ RowsOfTiles rows_of_tiles(const Block& block, const BlockState& state, const Til
     const bool prior = block.frames[frame].position_prior || block.frames[frame].attitude_prior;
     if (!tile.valid() || !state.oriented[frame] || !prior) continue;
     rows[static_cast<std::size_t>(tile.value)].frames.push_back(frame);
-    const RigIndex rig = block.frames[frame].rig;
-    if (!block.rigs[rig].has_receiver() || receiver_seen[rig]) continue;
-    receiver_seen[rig] = 1;
-    rows[static_cast<std::size_t>(tile.value)].mounts.push_back(receiver_id(block, rig));
+    const auto see_receiver = [&](RigIndex rig) {
+      if (!rig.valid() || !block.rigs[rig].has_receiver() || receiver_seen[rig]) return;
+      receiver_seen[rig] = 1;
+      rows[static_cast<std::size_t>(tile.value)].mounts.push_back(receiver_id(block, rig));
+    };
+    see_receiver(block.frames[frame].rig);
+    if (block.frames[frame].position_prior) see_receiver(block.frames[frame].position_prior->group);
   }
   for (std::size_t row = 0; row < block.relative_poses.size(); ++row) {
     const RelativePose& relative = block.relative_poses[row];

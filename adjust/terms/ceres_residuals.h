@@ -121,20 +121,28 @@ struct ImageMeasured {
   }
 };
 
-// r = (C + R' l - P) / sigma, and with a receiver at c r = (C + R' (l + c) - P) / sigma.
+// r = (C + R' (l + c) + o - P) / sigma, with the receiver at c and the shift o of the group, where there are any.
 struct PositionMeasured {
   PositionPrior prior;
+  bool has_receiver = false;  // of one mount, whether it is the receiver
   template <typename Scalar>
   bool operator()(const Scalar* frame, Scalar* result) const {
-    return differ<Scalar>(frame, prior.lever_arm.cast<Scalar>(), result);
+    return differ<Scalar>(frame, nullptr, nullptr, result);
   }
   template <typename Scalar>
-  bool operator()(const Scalar* frame, const Scalar* receiver, Scalar* result) const {
-    return differ<Scalar>(frame, prior.lever_arm.cast<Scalar>() + centre_of(receiver), result);
+  bool operator()(const Scalar* frame, const Scalar* mount, Scalar* result) const {
+    return differ<Scalar>(frame, has_receiver ? mount : nullptr, has_receiver ? nullptr : mount, result);
   }
   template <typename Scalar>
-  bool differ(const Scalar* frame, const Vector3<Scalar>& in_rig, Scalar* result) const {
-    const Vector3<Scalar> arm = rotation_of(frame).conjugate() * in_rig;
+  bool operator()(const Scalar* frame, const Scalar* receiver, const Scalar* group, Scalar* result) const {
+    return differ<Scalar>(frame, receiver, group, result);
+  }
+  template <typename Scalar>
+  bool differ(const Scalar* frame, const Scalar* receiver, const Scalar* group, Scalar* result) const {
+    Vector3<Scalar> in_rig = prior.lever_arm.cast<Scalar>(), shift = Vector3<Scalar>::Zero();
+    if (receiver) in_rig += centre_of(receiver);
+    if (group) shift = prior.shifted.cast<Scalar>().cwiseProduct(centre_of(group));
+    const Vector3<Scalar> arm = rotation_of(frame).conjugate() * in_rig + shift;
     for (int i = 0; i < 3; ++i) result[i] = (frame[4 + i] - prior.position[i] + arm[i]) / prior.sigma[i];
     return true;
   }

@@ -27,7 +27,7 @@ class MountPriors final : public ObservationType {
   std::size_t count(const TileProblem& problem) const override { return problem.mount_priors.size(); }
   TermUnknowns unknowns(const TileProblem& problem, std::size_t row) const override {
     TermUnknowns unknowns;
-    unknowns.mount = problem.mount_priors[row].mount;
+    unknowns.mounts[0] = problem.mount_priors[row].mount;
     return unknowns;
   }
   void linearise(const TileProblem& problem, const TileState& state, std::size_t row,

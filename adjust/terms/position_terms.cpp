@@ -1,7 +1,8 @@
 // Defines the terms for positions of frames, as GNSS observes them: r = (C + R' l - P) / sigma, with l the lever arm in
-// the axes of the rig, metres. A receiver in the block adds its centre c to l (io/block/observed_poses.h).
+// the axes of the rig, metres. A receiver in the block adds its centre c to l, and a group of positions its shift o to
+// the place (io/block/observed_poses.h).
 //
-//   C + R' l:   by w: [R' l]x (as Exp(-w) R' l),   by d: I,   by c: R'
+//   C + R' l + o:   by w: [R' l]x (as Exp(-w) R' l),   by d: I,   by c: R',   by o: I for the shifted axes
 //
 // The tile of the frame owns them. A held position (io/block/held_priors.h) has no loss, which would release it.
 #include "adjust/terms/automatic_terms.h"
@@ -22,7 +23,9 @@ FrameResidual3 linearise_position(const Pose& frame, const PositionPrior& prior)
 }
 
 PositionPrior prior_of(const TileProblem::PositionTerm& term, const TileState& state) {
-  return term.receiver < 0 ? term.prior : corrected(term.prior, state.mounts[static_cast<std::size_t>(term.receiver)]);
+  PositionPrior prior = term.prior;
+  if (term.group >= 0) prior = without_shift(prior, state.mounts[static_cast<std::size_t>(term.group)]);
+  return term.receiver < 0 ? prior : corrected(prior, state.mounts[static_cast<std::size_t>(term.receiver)]);
 }
 
 namespace {
@@ -34,7 +37,7 @@ class Positions final : public ObservationType {
   std::size_t count(const TileProblem& problem) const override { return problem.positions.size(); }
   TermUnknowns unknowns(const TileProblem& problem, std::size_t row) const override {
     TermUnknowns unknowns{{problem.positions[row].frame.value}, 1};
-    unknowns.mount = problem.positions[row].receiver;
+    unknowns.mounts = {problem.positions[row].receiver, problem.positions[row].group};
     return unknowns;
   }
   void linearise(const TileProblem& problem, const TileState& state, std::size_t row,
@@ -46,12 +49,15 @@ class Positions final : public ObservationType {
     out.set_residual(r.residual);
     out.kinds = {kPositionHorizontal, kPositionHorizontal, kPositionHeight};
     out.add_block(LinearTerm::By::kFrame, term.frame.value, r.by_frame);
-    if (term.receiver >= 0) {
-      Eigen::Matrix<double, 3, 6> by_receiver = Eigen::Matrix<double, 3, 6>::Zero();
-      by_receiver.rightCols<3>() =
-          term.prior.sigma.cwiseInverse().asDiagonal() * frame.rotation.conjugate().toRotationMatrix();
-      out.add_block(LinearTerm::By::kMount, term.receiver, by_receiver);
-    }
+    const Eigen::Vector3d weight = term.prior.sigma.cwiseInverse();
+    const auto add_mount = [&](std::int32_t mount, const Eigen::Matrix3d& by_centre) {
+      if (mount < 0) return;
+      Eigen::Matrix<double, 3, 6> by_mount = Eigen::Matrix<double, 3, 6>::Zero();
+      by_mount.rightCols<3>() = weight.asDiagonal() * by_centre;
+      out.add_block(LinearTerm::By::kMount, mount, by_mount);
+    };
+    add_mount(term.receiver, frame.rotation.conjugate().toRotationMatrix());
+    add_mount(term.group, term.prior.shifted.cast<double>().asDiagonal());
     out.loss = loss_of(problem, term);
     visit(out);
   }
@@ -79,9 +85,11 @@ class Positions final : public ObservationType {
   }
   ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const override {
     const TileProblem::PositionTerm& term = problem.positions[row];
-    const residual::PositionMeasured measured{term.prior};
-    if (term.receiver < 0) return automatic_term<3, kPoseBlock>(measured);
-    return automatic_term<3, kPoseBlock, kPoseBlock>(measured);
+    const residual::PositionMeasured measured{term.prior, term.receiver >= 0};
+    const int mounts = (term.receiver >= 0 ? 1 : 0) + (term.group >= 0 ? 1 : 0);
+    if (mounts == 0) return automatic_term<3, kPoseBlock>(measured);
+    if (mounts == 1) return automatic_term<3, kPoseBlock, kPoseBlock>(measured);
+    return automatic_term<3, kPoseBlock, kPoseBlock, kPoseBlock>(measured);
   }
 };
 

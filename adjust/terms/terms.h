@@ -37,7 +37,8 @@ namespace megablock {
 struct TermUnknowns {
   std::array<std::int32_t, 2> frame{-1, -1};
   int frame_count = 0;
-  std::int32_t mount = -1, camera = -1;  // -1: none
+  std::array<std::int32_t, 2> mounts{-1, -1};  // -1: none
+  std::int32_t camera = -1;                    // -1: none
   std::int64_t point = -1;               // the tile or cell that owns the point owns the row
 };
 
@@ -111,7 +112,7 @@ class ObservationType {
   virtual RobustLoss loss(const TileProblem&, std::size_t) const { return {}; }
   // Multiplies the sigmas of all rows, if they may be estimated (observation_statistics.h says which).
   virtual void scale_sigmas(TileProblem&, const SigmaScales&) const {}
-  // A cost function for Ceres by automatic differentiation. Its blocks are those of unknowns(): frames, mount, camera,
+  // A cost function for Ceres by automatic differentiation. Its blocks are those of unknowns(): frames, mounts, camera,
   // point. The caller owns it.
   virtual ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const = 0;
 };

@@ -97,7 +97,7 @@ class SeenVerticals final : public ObservationType {
     const TileProblem::VerticalTerm& term = problem.verticals[row];
     const TileImage& image = image_of(problem, term);
     TermUnknowns unknowns{{image.frame.value}, 1};
-    unknowns.mount = image.mount;
+    unknowns.mounts[0] = image.mount;
     if (term.camera.size() > 0) unknowns.camera = image.camera.value;
     return unknowns;
   }

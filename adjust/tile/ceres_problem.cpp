@@ -232,7 +232,8 @@ void CeresTile::add_others(const TileProblem& problem) {
       if (term.point >= 0 && !point_used_[term.point]) continue;
       std::vector<double*> blocks;
       for (int f = 0; f < term.frame_count; ++f) blocks.push_back(frame(term.frame[static_cast<std::size_t>(f)]));
-      if (term.mount >= 0) blocks.push_back(mount(term.mount));
+      for (const std::int32_t m : term.mounts)
+        if (m >= 0) blocks.push_back(mount(m));
       if (term.camera >= 0) blocks.push_back(camera(term.camera));
       if (term.point >= 0) blocks.push_back(point(term.point));
       ceres_->AddResidualBlock(type->automatic(problem, row), loss(type->loss(problem, row)), blocks);

@@ -88,7 +88,7 @@ void describe(OptionVisitor& visit, OrientationOptions& o) {
   visit.integer("min_points_per_image", o.min_points_per_image);
   visit.integer("tracks_per_pair", o.tracks_per_pair);
   visit.integer("part_frames", o.part_frames);
-  visit.flag("move_positions_to_control", o.move_positions_to_control);
+  visit.flag("shift_positions", o.shift_positions);
 }
 
 void describe(OptionVisitor& visit, EnvironmentOptions& o) {

@@ -122,8 +122,9 @@ void check(const Block& block) {
       require(sigma >= 0, "camera '" + camera.name + "': a prior sigma is negative or not a number");
   }
   for (const Rig& rig : block.rigs) {
-    require(!rig.cameras().empty(), "rig '" + rig.name + "': has no camera");
-    require(rig.mounts.front().held(), "rig '" + rig.name + "': its first mount is the reference and must be held");
+    require(!rig.mounts.empty(), "rig '" + rig.name + "': has no camera");
+    require(rig.is_group() || rig.mounts.front().held(),
+            "rig '" + rig.name + "': its first mount is the reference and must be held");
     for (const Mount& mount : rig.cameras()) {
       require(block.cameras.contains(mount.camera),
               "rig '" + rig.name + "': a mount refers to a camera that the block does not have");
@@ -138,7 +139,11 @@ void check(const Block& block) {
             "rig '" + rig.name + "': the sigmas of a receiver must be at least 0");
   }
   for (const Frame& frame : block.frames) {
-    require(block.rigs.contains(frame.rig), "frame '" + frame.name + "': refers to a rig that the block does not have");
+    require(block.rigs.contains(frame.rig) && !block.rigs[frame.rig].is_group(),
+            "frame '" + frame.name + "': refers to a rig that the block does not have");
+    if (frame.position_prior && frame.position_prior->group.valid())
+      require(block.rigs.contains(frame.position_prior->group) && block.rigs[frame.position_prior->group].is_group(),
+              "frame '" + frame.name + "': its position belongs to a group that the block does not have");
     if (frame.position_prior)
       require(frame.position_prior->position.allFinite() && frame.position_prior->lever_arm.allFinite() &&
                   positive(frame.position_prior->sigma),

@@ -59,11 +59,13 @@ struct Mount {
   bool held() const { return rotation_sigma_rad == 0 && position_sigma_m == 0; }
 };
 
-// Cameras that are fixed to each other, and the receiver that observes their positions and attitudes.
+// Cameras that are fixed to each other, and the receiver that observes their positions and attitudes. A rig without
+// cameras is a group of positions with a shift of their own (observed_poses.h).
 struct Rig {
   std::string name;
   std::vector<Mount> mounts;  // of the cameras, then of the receiver, where it is no part of the priors
   bool has_receiver() const { return !mounts.empty() && !mounts.back().camera.valid(); }
+  bool is_group() const { return mounts.size() == 1 && has_receiver(); }
   std::span<const Mount> cameras() const { return {mounts.data(), mounts.size() - (has_receiver() ? 1 : 0)}; }
 };
 
@@ -73,6 +75,8 @@ struct PositionPrior {
   Eigen::Vector3d sigma = Eigen::Vector3d(3, 3, 6);    // metres; east, north, up
   // Position of the antenna in the rig, metres: antenna = C + R' lever_arm.
   Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();
+  RigIndex group{};                                    // whose shift the position has; invalid: none
+  Eigen::Matrix<std::uint8_t, 3, 1> shifted{0, 0, 0};  // 1 for each axis along which the group is shifted
 };
 
 // Attitude observed in the ground frame. Where it was observed relative to the vertical at the frame's own place, it

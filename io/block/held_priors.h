@@ -40,13 +40,12 @@ inline void place_held_frames(const Block& block, BlockState& state) {
     const Frame& frame = block.frames[f];
     if (!state.oriented[f]) continue;
     Pose& pose = state.frames[f];
-    const Rig& rig = block.rigs[frame.rig];
-    const std::vector<Pose>& mounts = state.mounts[frame.rig];
     if (frame.attitude_prior && held(*frame.attitude_prior))
-      pose.rotation = corrected(*frame.attitude_prior, rig, mounts).rotation_cw;
-    if (frame.position_prior && held(*frame.position_prior))
-      pose.centre = frame.position_prior->position -
-                    pose.rotation.conjugate() * corrected(*frame.position_prior, rig, mounts).lever_arm;
+      pose.rotation = corrected(*frame.attitude_prior, block, frame.rig, state.mounts).rotation_cw;
+    if (frame.position_prior && held(*frame.position_prior)) {
+      const PositionPrior prior = corrected(*frame.position_prior, block, frame.rig, state.mounts);
+      pose.centre = prior.position - pose.rotation.conjugate() * prior.lever_arm;
+    }
   }
 }
 

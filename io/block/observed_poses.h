@@ -10,6 +10,11 @@
 //
 // They are unknowns like those of every other mount, with the sigmas of the project file as their prior. The
 // differences from it are about the axes of the rig, not about those of the receiver.
+//
+// The positions of a flight, a day or a receiver may have a datum of their own, as ellipsoidal heights have beside
+// orthometric ones. A rig without cameras stands for such a group. The centre of its only mount is its shift o:
+//
+//     antenna = C + R' (l + c) + o,    o only along the axes for which PositionPrior::shifted is 1.
 #pragma once
 
 #include <cmath>
@@ -27,19 +32,40 @@ inline AttitudePrior corrected(AttitudePrior prior, const Pose& receiver) {
   prior.rotation_cw = (receiver.rotation.conjugate() * prior.rotation_cw).normalized();
   return prior;
 }
-// `mounts`: the poses of the rig's mounts.
-template <typename Prior>
-Prior corrected(const Prior& prior, const Rig& rig, const std::vector<Pose>& mounts) {
-  return rig.has_receiver() ? corrected(prior, mounts.back()) : prior;
+// A group whose positions lie `shift` off the block's ground frame (metres), known to `sigma_m` along each axis.
+inline Rig position_group(std::string name, const Eigen::Vector3d& shift, double sigma_m) {
+  Mount receiver;
+  receiver.pose.centre = shift;
+  receiver.position_sigma_m = sigma_m;
+  return {std::move(name), {receiver}};
 }
-
-// The prior with the uncertainty of the receiver, for a start that does not know it yet.
-inline PositionPrior loosened(PositionPrior prior, const Rig& rig) {
-  if (rig.has_receiver())
-    for (double& sigma : prior.sigma) sigma = std::hypot(sigma, rig.mounts.back().position_sigma_m);
+// The position without the shift of its group.
+inline PositionPrior without_shift(PositionPrior prior, const Pose& group) {
+  prior.position -= prior.shifted.cast<double>().cwiseProduct(group.centre);
   return prior;
 }
-inline AttitudePrior loosened(AttitudePrior prior, const Rig& rig) {
+// `mounts`: the poses of all mounts of the block.
+template <typename Prior>
+Prior corrected(Prior prior, const Block& block, RigIndex rig,
+                const IndexedVector<RigIndex, std::vector<Pose>>& mounts) {
+  if constexpr (requires { prior.group; })
+    if (prior.group.valid()) prior = without_shift(prior, mounts[prior.group].front());
+  return block.rigs[rig].has_receiver() ? corrected(prior, mounts[rig].back()) : prior;
+}
+
+// The prior with the uncertainty of its receiver and its group, for a start that does not know them yet.
+inline PositionPrior loosened(PositionPrior prior, const Block& block, RigIndex of_frame) {
+  const Rig& rig = block.rigs[of_frame];
+  if (rig.has_receiver())
+    for (double& sigma : prior.sigma) sigma = std::hypot(sigma, rig.mounts.back().position_sigma_m);
+  if (prior.group.valid())
+    for (int k = 0; k < 3; ++k)
+      prior.sigma[k] =
+          std::hypot(prior.sigma[k], prior.shifted[k] * block.rigs[prior.group].mounts.back().position_sigma_m);
+  return prior;
+}
+inline AttitudePrior loosened(AttitudePrior prior, const Block& block, RigIndex of_frame) {
+  const Rig& rig = block.rigs[of_frame];
   if (rig.has_receiver())
     for (double& sigma : prior.sigma_rad) sigma = std::hypot(sigma, rig.mounts.back().rotation_sigma_rad);
   return prior;

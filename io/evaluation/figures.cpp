@@ -461,12 +461,13 @@ void find_prior_residuals(const BlockResult& result, Figures& figures) {
     if (!result.state.oriented[f]) continue;
     const Pose& pose = result.state.frames[f];
     const Frame& frame = result.block.frames[f];
-    const Rig& rig = result.block.rigs[frame.rig];
-    const std::vector<Pose>& mounts = result.state.mounts[frame.rig];
+    const auto as_corrected = [&](const auto& prior) {
+      return corrected(prior, result.block, frame.rig, result.state.mounts);
+    };
     if (const auto& prior = frame.position_prior)
-      figures.positions.push_back({f, difference(pose, corrected(*prior, rig, mounts)), used_sigma(result, *prior)});
+      figures.positions.push_back({f, difference(pose, as_corrected(*prior)), used_sigma(result, *prior)});
     if (const auto& prior = frame.attitude_prior)
-      figures.attitudes.push_back({f, difference(pose, corrected(*prior, rig, mounts)), prior->sigma_rad});
+      figures.attitudes.push_back({f, difference(pose, as_corrected(*prior)), prior->sigma_rad});
   }
 }
 

@@ -13,6 +13,7 @@
 #include "geometry/transform/rotation.h"
 #include "io/block/held_priors.h"
 #include "io/block/observed_poses.h"
+#include "io/text/side_text.h"
 
 namespace megablock {
 
@@ -163,7 +164,7 @@ std::vector<ReceiverFigures> receivers_of(const BlockResult& result) {
   std::vector<ReceiverFigures> receivers;
   for (RigIndex r(0); result.block.rigs.contains(r) && result.state.mounts.contains(r); ++r.value) {
     const Rig& rig = result.block.rigs[r];
-    if (!rig.has_receiver() || rig.mounts.back().held()) continue;
+    if (!rig.has_receiver() || rig.is_group() || rig.mounts.back().held()) continue;
     const Pose& pose = result.state.mounts[r].back();
     ReceiverFigures figures;
     figures.rig = r;
@@ -178,6 +179,29 @@ std::vector<ReceiverFigures> receivers_of(const BlockResult& result) {
     receivers.push_back(figures);
   }
   return receivers;
+}
+
+std::vector<ShiftFigures> shifts_of(const BlockResult& result) {
+  const auto& covariances =
+      result.empirical.mount_covariance.empty() ? result.mount_covariance : result.empirical.mount_covariance;
+  std::vector<ShiftFigures> shifts;
+  for (RigIndex r(0); result.block.rigs.contains(r) && covariances.contains(r); ++r.value) {
+    if (!result.block.rigs[r].is_group()) continue;
+    const auto is_member = [&](const Frame& frame) { return frame.position_prior && frame.position_prior->group == r; };
+    const auto member = std::ranges::find_if(result.block.frames, is_member);
+    if (member == result.block.frames.end()) continue;
+    const Eigen::Vector3d axes = member->position_prior->shifted.cast<double>();
+    const Eigen::Vector3d variance = covariances[r].front().diagonal().tail<3>();
+    ShiftFigures figures{r, axes.cwiseProduct(result.state.mounts[r].front().centre),
+                         axes.cwiseProduct(Eigen::Vector3d(variance.cwiseMax(0).cwiseSqrt()))};
+    if (!figures.sigma.isZero(0)) shifts.push_back(figures);
+  }
+  return shifts;
+}
+
+std::string shift_text(const BlockResult& result, const ShiftFigures& figures) {
+  return fmt::format("in the adjusted block the {} lie {} it (sigma {:.2g} m)", result.block.rigs[figures.group].name,
+                     side_text(figures.shift), figures.sigma.maxCoeff());
 }
 
 std::vector<std::string> receiver_remarks(const BlockResult& result, const report::Figures& figures) {

@@ -1,5 +1,5 @@
-// Tells what a block found out about its receivers: lever arms and boresights that were estimated, and those that were
-// taken as given but contradict the images.
+// Tells what a block found out about its receivers: lever arms, boresights and shifts that were estimated, and lever
+// arms and boresights that were taken as given but contradict the images.
 //
 // The difference y_f of an observed position or attitude from the adjusted pose of frame f, in axes of the rig (metres,
 // radians), is
@@ -31,6 +31,15 @@ struct ReceiverFigures {
   Eigen::Vector3d boresight = Eigen::Vector3d::Zero(), boresight_sigma = Eigen::Vector3d::Zero();
 };
 std::vector<ReceiverFigures> receivers_of(const BlockResult& result);
+
+// The shift of a group of positions (io/block/observed_poses.h), metres. Axes along which it is not shifted are 0.
+struct ShiftFigures {
+  RigIndex group;
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero(), sigma = Eigen::Vector3d::Zero();  // sigma: empirical where known
+};
+std::vector<ShiftFigures> shifts_of(const BlockResult& result);
+// "in the adjusted block the positions of a.jpg and 8 more lie 29.81 m above it (sigma 0.12 m)".
+std::string shift_text(const BlockResult& result, const ShiftFigures& figures);
 
 // One line for each rig whose antenna or attitudes are off by one vector of the rig, with the option that estimates it.
 std::vector<std::string> receiver_remarks(const BlockResult& result, const report::Figures& figures);

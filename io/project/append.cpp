@@ -152,6 +152,8 @@ Block append_to(const Block& previous, Block moved, const std::function<void()>&
   for (std::size_t i = 0; i < frames.size(); ++i) {
     Frame frame = moved.frames.Base::operator[](i);
     frame.rig = rigs[frame.rig];
+    if (frame.position_prior && frame.position_prior->group.valid())
+      frame.position_prior->group = rigs[frame.position_prior->group];
     merged.frames[frames.Base::operator[](i)] = std::move(frame);
   }
   for (std::size_t i = 0; i < images.size(); ++i) {

@@ -13,8 +13,11 @@
 // A lever arm or boresight with a sigma, or a boresight that is not zero, gives the rig a receiver
 // (io/block/observed_poses.h).
 //
+// Positions of a group (`gps: {groups: [...]}`) have a shift in common, an unknown of the adjustment.
+//
 // A kilometre from the origin the verticals differ by half a minute of arc, so this matters for large blocks.
 #include <fmt/core.h>
+#include <fnmatch.h>
 
 #include <algorithm>
 #include <cmath>
@@ -24,6 +27,7 @@
 #include "io/base/error.h"
 #include "io/block/crs.h"
 #include "io/block/held_priors.h"
+#include "io/block/observed_poses.h"
 #include "io/project/pose_sources.h"
 #include "io/project/project_sections.h"
 #include "io/text/plausible.h"
@@ -39,7 +43,9 @@ struct GpsOptions {
   bool given = false, use = true;  // given: the project file has this section
   std::optional<double> sigma_horizontal, sigma_vertical;
   Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();
-  double lever_arm_sigma = 0;  // metres; 0: the lever arm is held
+  double lever_arm_sigma = 0;       // metres; 0: the lever arm is held
+  std::vector<std::string> groups;  // patterns of image names
+  double group_sigma = 100;         // of the shift of a group, metres
 };
 
 struct AttitudeOptions {
@@ -81,6 +87,11 @@ GpsOptions read_gps_options(YamlReader& top, bool from_images) {
     check_on_vehicle(options.lever_arm, "gps.lever_arm_m", reader->where("lever_arm_m"));
   }
   options.lever_arm_sigma = read_receiver_sigma(*reader, "lever_arm_sigma_m", kSigmaMetres);
+  options.groups = reader->texts("groups").value_or(std::vector<std::string>());
+  if (const auto sigma = reader->number("group_sigma_m")) {
+    check_within(*sigma, kSigmaMetres, "group_sigma_m", reader->where("group_sigma_m"));
+    options.group_sigma = *sigma;
+  }
   reader->finish();
   return options;
 }
@@ -108,6 +119,27 @@ void set_receivers(Block& block, const auto& has_prior, const auto& set) {
     if (!has_prior(frame)) continue;
     if (!rig.has_receiver()) rig.mounts.push_back({});
     set(rig.mounts.back());
+  }
+}
+
+// Gives the positions of the images that match a pattern a shift in common. An image belongs to the first such pattern.
+void set_groups(const GpsOptions& options, const std::string& where, Block& block) {
+  for (const std::string& pattern : options.groups) {
+    const RigIndex group = block.rigs.next_index();
+    bool any = false;
+    for (ImageIndex i(0); block.images.contains(i); ++i.value) {
+      auto& prior = block.frames[block.images[i].frame].position_prior;
+      if (!prior || prior->group.valid() || fnmatch(pattern.c_str(), block.name_of(i).c_str(), 0) != 0) continue;
+      prior->group = group;
+      prior->shifted.setOnes();
+      any = true;
+    }
+    if (!any)
+      throw InputError(fmt::format(
+          "{}: gps.groups: no image with a position matches '{}', or those that do belong to a group before it; "
+          "patterns are as 'flight2/*.jpg', with the folders below 'images'",
+          where, pattern));
+    block.rigs.push_back(position_group("positions of " + pattern, Eigen::Vector3d::Zero(), options.group_sigma));
   }
 }
 
@@ -247,11 +279,12 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, b
     block.ground = ground_at(one ? known_height(known[0]) : rounded_median(known));
   else if (!others.empty() && !block.ground.georeferenced)
     block.ground = ground_at(rounded_median(others));
-  const auto free_lever_arms = [&] {
+  const auto set_unknowns = [&] {
     if (options.lever_arm_sigma > 0)
       set_receivers(block, has_position, [&](Mount& receiver) { receiver.position_sigma_m = options.lever_arm_sigma; });
+    if (!options.groups.empty()) set_groups(options, top.where("gps"), block);
   };
-  if (!from_images) return free_lever_arms();
+  if (!from_images) return set_unknowns();
   if (!known.empty() && !block.ground.georeferenced)
     project.warnings.push_back(
         "GPS positions are not used, because the block of this job is not georeferenced; start a new job to use them");
@@ -260,7 +293,7 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, b
     project.warnings.push_back(text_of_one_position(known, scanned.size()));
   }
   const auto sigmas = set_position_priors(scanned, positions, options, block);
-  free_lever_arms();
+  set_unknowns();
   project.found = lines_of_positions(scanned, sigmas);
 }
 

@@ -108,6 +108,15 @@ OrderedJson receivers(const BlockResult& result) {
   return list;
 }
 
+OrderedJson position_groups(const BlockResult& result) {
+  OrderedJson list = OrderedJson::array();
+  for (const ShiftFigures& group : shifts_of(result))
+    list.push_back({{"group", result.block.rigs[group.group].name},
+                    {"shift_m", vector(group.shift)},
+                    {"sigma_shift_m", vector(group.sigma)}});
+  return list;
+}
+
 }  // namespace
 
 std::string figures_json(const BlockResult& result, const Figures& f) {
@@ -151,6 +160,7 @@ std::string figures_json(const BlockResult& result, const Figures& f) {
       {"cameras", cameras(result)},
       {"mounts", mounts(result)},
       {"receivers", receivers(result)},
+      {"position_groups", position_groups(result)},
       {"failures", failures(result)},
       {"stages", stages(result)},
       {"notes", result.notes}};

@@ -57,7 +57,8 @@ TouchedRows touched_rows(const TileProblem& problem, const std::vector<Parameter
   visit_all_terms(problem, [&](TermRow, const TermUnknowns& term) {
     for (int f = 0; f < term.frame_count; ++f) touched.frames[at(term.frame[at(f)])] = 1;
     if (term.camera >= 0 && camera_free[at(term.camera)]) touched.cameras[at(term.camera)] = 1;
-    if (term.mount >= 0 && problem.mount_free[at(term.mount)]) touched.mounts[at(term.mount)] = 1;
+    for (const std::int32_t mount : term.mounts)
+      if (mount >= 0 && problem.mount_free[at(mount)]) touched.mounts[at(mount)] = 1;
   });
   return touched;
 }
@@ -219,10 +220,11 @@ class CellPlanner {
       frames.assign(term.frame.begin(), term.frame.begin() + term.frame_count);
       const std::size_t cell = !frames.empty()    ? owner_of(frames)
                                : term.camera >= 0 ? camera_cell[at(term.camera)]
-                                                  : mount_cell[at(term.mount)];
+                                                  : mount_cell[at(term.mounts[0])];
       plan_.terms[cell].push_back(row);
       for (const std::int32_t frame : frames) touch(cell, plan_.unknown_of_frame[at(frame)]);
-      if (term.mount >= 0) touch(cell, plan_.unknown_of_mount[at(term.mount)]);
+      for (const std::int32_t mount : term.mounts)
+        if (mount >= 0) touch(cell, plan_.unknown_of_mount[at(mount)]);
       if (term.camera >= 0) touch(cell, plan_.unknown_of_camera[at(term.camera)]);
     });
   }

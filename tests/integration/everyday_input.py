@@ -119,7 +119,7 @@ class EverydayInput(CopyOfTheBlock):
                 self.assertIsNotNone(found, notes)
                 self.assertLess(abs(float(found[1]) - 47), 3 * float(found[2]))
                 self.assertLess(float(found[2]), 5)
-                found = re.search(rf"adjusted block the positions lie {number} m above the control points \(sigma {number} m\)",
+                found = re.search(rf"adjusted block the positions of .* lie {number} m above it \(sigma {number} m\)",
                                   notes)
                 self.assertIsNotNone(found, notes)
                 self.assertLess(abs(float(found[1]) - 47), 3 * float(found[2]) + 0.005)
@@ -128,6 +128,34 @@ class EverydayInput(CopyOfTheBlock):
                 self.assertGreaterEqual(state["check_points"]["compared"], 1)
                 self.assertLess(state["check_points"]["normalised_error"], 3)
                 self.assertLess(state["check_points"]["rms_vertical_m"], 0.2)
+
+    def test_positions_of_two_flights_get_a_shift(self):
+        simulate("flights", 12, 480, 360)
+        self.use("flights")
+        random = numpy.random.default_rng(5)
+        with h5py.File(self.folder / "truth.h5") as truth:
+            positions = truth["frames/centre"][:] + 0.05 * random.standard_normal((12, 3))
+        positions[7:, 2] += 5
+        names = sorted(file.name for file in self.files())
+        rows = [f"{name},{x},{y},{z}" for name, (x, y, z) in zip(names, positions)]
+        (self.folder / "positions.csv").write_text("\n".join(["image,x,y,z", *rows]))
+        project = ("positions: {file: positions.csv, crs: local}\n"
+                   "gps: {sigma_horizontal_m: 0.05, sigma_vertical_m: 0.05}\n")
+        for more in ("", "orientation: {shift_positions: false}\n"):
+            with self.subTest(project=more):
+                self.write_project(project + more)
+                self.run_job()
+                self.assert_all_oriented()
+                state = status(self.job)
+                errors = json.loads(megablock("evaluate", self.job, self.folder / "truth.h5", "--json"))
+                if more:
+                    self.assertGreater(errors["position_rms_m"], 0.3)
+                    continue
+                notes = " ".join(state["notes"])
+                self.assertRegex(notes, "5 positions .* lie [45][0-9.]* m above the 7 others")
+                found = re.search(r"in the adjusted block the positions of \S+ and 4 more lie ([0-9.]+) m above it", notes)
+                self.assertLess(abs(float(found[1]) - 5), 0.2, notes)
+                self.assertLess(errors["position_rms_m"], 0.15)
 
     def focal_px(self):
         with h5py.File(self.job / "result/block.h5") as result:

@@ -54,9 +54,9 @@ Rows add_frames_and_images(const Block& block, const BlockState& start, const st
       OrientationGraph::FrameNode node{frame, {}, {}, {}};
       const Frame& given = block.frames[frame];
       if (options.observations.use_position_priors && given.position_prior)
-        node.position = comparable(loosened(*given.position_prior, block.rigs[given.rig]));
+        node.position = comparable(loosened(*given.position_prior, block, given.rig));
       if (options.observations.use_attitude_priors && given.attitude_prior)
-        node.attitude = comparable(loosened(*given.attitude_prior, block.rigs[given.rig]));
+        node.attitude = comparable(loosened(*given.attitude_prior, block, given.rig));
       if (start.oriented[frame]) {
         constexpr double kSigma = 0.01;  // metres
         node.given = start.frames[frame];

@@ -22,6 +22,7 @@ inline void add_to_hash(Hasher& hasher, const PositionPrior& prior) {
   add_to_hash(hasher, prior.position);
   add_to_hash(hasher, prior.sigma);
   add_to_hash(hasher, prior.lever_arm);
+  if (prior.group.valid()) add_to_hash(hasher.add(prior.group.value), Eigen::Vector3d(prior.shifted.cast<double>()));
 }
 
 inline void add_to_hash(Hasher& hasher, const AttitudePrior& prior) {

@@ -17,7 +17,10 @@ Block first_images(const Block& block, std::int64_t n) {
   for (ImageIndex i(0); i.value < n; ++i.value) part.image_names.push_back(block.image_names[i]);
   std::int64_t rigs = 0, cameras = 0;
   part.frames.resize(static_cast<std::size_t>(frames_of_first_images(block, n)));
-  for (const Frame& frame : part.frames) rigs = std::max(rigs, frame.rig.value + 1);
+  for (const Frame& frame : part.frames) {
+    rigs = std::max(rigs, frame.rig.value + 1);
+    if (frame.position_prior) rigs = std::max(rigs, frame.position_prior->group.value + 1);
+  }
   part.rigs.resize(static_cast<std::size_t>(rigs));
   for (const Rig& rig : part.rigs)
     for (const Mount& mount : rig.cameras()) cameras = std::max(cameras, mount.camera.value + 1);

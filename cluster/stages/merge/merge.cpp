@@ -27,6 +27,7 @@
 #include "cluster/stages/result/result_files.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
+#include "io/evaluation/receivers.h"
 #include "io/store/job/events.h"
 #include "io/text/counted.h"
 #include "merge/checks/seam_text.h"
@@ -305,18 +306,6 @@ std::vector<StageStatistics> statistics_of(const Job& job, const JobRecord& reco
   return statistics;
 }
 
-// Says how far positions that were moved onto the control lie off it.
-void tell_of_moved(const Job& job, JobRecord& record, const std::vector<MovedPositions>& all,
-                   const MergeOutcome& outcome) {
-  const auto& covariances =
-      job.settings.merge.empirical_sigmas ? outcome.empirical.frame_covariance : outcome.formal.frame_covariance;
-  IndexedVector<FrameIndex, Eigen::Vector3d> variances;
-  for (const auto& covariance : covariances) variances.push_back(covariance.diagonal().tail<3>());
-  for (const MovedPositions& moved : all)
-    add_note(job, record, kMergeStage,
-             adjusted_offset_text(adjusted_offset(moved, job.block, outcome.state, variances)));
-}
-
 void write_final(const Job& job, JobRecord& record, JobBlock& own, const MergeInputs& inputs,
                  const OrientationStage& oriented, std::uint64_t fingerprint, const Adjusted& adjusted,
                  const std::string& reason, MergeOutcome outcome, const std::vector<TilePart>& parts,
@@ -336,10 +325,13 @@ void write_final(const Job& job, JobRecord& record, JobBlock& own, const MergeIn
     record.notes.push_back(line);
     say(job, kMergeStage, line);
   }
-  if (!oriented.moved.empty()) tell_of_moved(job, record, oriented.moved, outcome);
   job.tables.release();  // frames
   BlockResult result =
       assemble_result(job, record, own.block, inputs.tiles, oriented.not_oriented, std::move(outcome), parts);
+  for (const ShiftFigures& shift : shifts_of(result)) {
+    result.notes.push_back(shift_text(result, shift));
+    add_note(job, record, kMergeStage, result.notes.back());
+  }
   if (!reason.empty()) result.failures.push_back({kMergeStage, kResult, reason});
   result.stages = statistics_of(job, record, event);
   std::vector<PartTracks::File> files;

@@ -157,11 +157,11 @@ TileAdjustment adjust_one(const Job& job, const OrientedTiles& from, TileIndex t
     ++result.camera_observations[static_cast<std::size_t>(image.camera.value)];
     ++result.mount_observations[static_cast<std::size_t>(image.mount)];
   }
-  const auto count_receiver = [&](const auto& term) {
-    if (term.receiver >= 0) ++result.mount_observations[static_cast<std::size_t>(term.receiver)];
+  const auto count = [&](std::int32_t mount) {
+    if (mount >= 0) ++result.mount_observations[static_cast<std::size_t>(mount)];
   };
-  std::ranges::for_each(problem.positions, count_receiver);
-  std::ranges::for_each(problem.attitudes, count_receiver);
+  for (const auto& term : problem.positions) count(term.receiver), count(term.group);
+  for (const auto& term : problem.attitudes) count(term.receiver);
   result.parts = std::move(parts);
   result.points = std::move(state.points);
   result.kept = std::move(problem.kept);

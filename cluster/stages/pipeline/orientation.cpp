@@ -13,6 +13,8 @@
 #include "adjust/orientation/control_alignment.h"
 #include "adjust/orientation/given_trajectories.h"
 #include "adjust/orientation/orientation.h"
+#include "adjust/orientation/position_offset.h"
+#include "adjust/orientation/position_shifts.h"
 #include "adjust/orientation/vertical_check.h"
 #include "cluster/job/messages.h"
 #include "cluster/job/work_queue.h"
@@ -263,14 +265,24 @@ void align_part(const Stage& stage, const Job& job, JobRecord& record, const std
         "the images alone; add a control point off the line, positions or attitudes");
 }
 
-// Moves the parts of the block onto the control points: those without positions by a similarity, and those whose
-// positions contradict the control by one offset, together with these positions, which are returned.
-std::vector<MovedPositions> move_onto_control(const Stage& stage, const Job& job, JobRecord& record, DisjointSets& sets,
-                                              Block& own, BlockState& state) {
+// Gives groups of positions that contradict the others a shift of their own.
+void shift_groups(const Stage& stage, const Job& job, JobRecord& record, const std::vector<FrameIndex>& frames,
+                  Block& own, BlockState& state) {
+  const PositionShifts found = find_position_shifts(own, state, frames);
+  if (found.groups.empty()) return;
+  move_frames(found.to_others, frames, state);
+  for (const PositionShift& shift : found.groups) {
+    add_position_group(shift.frames, shift.offset, shift.shifted, own, state);
+    add_note(job, record, stage.name, shift_text(own, shift));
+  }
+}
+
+// Finds what contradicts the datum of each part of the block. Groups of positions that contradict the others get a
+// shift. Parts without positions are moved onto the control by a similarity, and those whose positions contradict the
+// control by one offset get it as a shift.
+void settle_datum(const Stage& stage, const Job& job, JobRecord& record, DisjointSets& sets, Block& own,
+                  BlockState& state) {
   const Block& block = job.block;
-  std::vector<MovedPositions> moved;
-  if (std::ranges::none_of(block.control_points, [](const auto& p) { return p.role == PointRole::kControl; }))
-    return moved;
   std::map<std::int64_t, std::vector<FrameIndex>> parts;
   std::set<std::int64_t> with_positions, with_given_poses;
   for (FrameIndex f(0); block.frames.contains(f); ++f.value) {
@@ -281,19 +293,21 @@ std::vector<MovedPositions> move_onto_control(const Stage& stage, const Job& job
     if (frame.given_pose) with_given_poses.insert(part);
     if (job.settings.adjustment.observations.use_position_priors && frame.position_prior) with_positions.insert(part);
   }
+  const bool any_control =
+      std::ranges::any_of(block.control_points, [](const auto& p) { return p.role == PointRole::kControl; });
   for (const auto& [part, frames] : parts) {
     if (with_given_poses.contains(part)) continue;
     if (!with_positions.contains(part)) {
-      align_part(stage, job, record, frames, state);
-    } else if (job.settings.orientation.move_positions_to_control) {
-      const auto offset = find_position_offset(block, state, frames);
-      if (!offset) continue;
-      remove_offset(*offset, frames, own.frames, state);
-      add_note(job, record, stage.name, offset_text(*offset));
-      moved.push_back({*offset, frames});
+      if (any_control) align_part(stage, job, record, frames, state);
+      continue;
     }
+    if (!job.settings.orientation.shift_positions) continue;
+    shift_groups(stage, job, record, frames, own, state);
+    const auto offset = any_control ? find_position_offset(block, state, frames) : std::nullopt;
+    if (!offset) continue;
+    shift_positions(*offset, frames, own, state);
+    add_note(job, record, stage.name, offset_text(*offset));
   }
-  return moved;
 }
 
 }  // namespace
@@ -357,7 +371,7 @@ OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& 
     if (one_plane) add_note(job, record, stage.name, kOnePlane);
   }
   state = held_in_place(job, grow(state, job.block));
-  made.moved = move_onto_control(stage, job, record, connected, own, state);
+  settle_datum(stage, job, record, connected, own, state);
   return made;
 }
 

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "adjust/orientation/position_offset.h"
 #include "cluster/job/job.h"
 #include "cluster/job/job_record.h"
 #include "cluster/job/stage.h"
@@ -15,12 +14,11 @@ namespace megablock {
 struct OrientationStage {
   BlockState state;
   std::map<FrameIndex, std::string> not_oriented;  // frames without a pose, and why
-  std::vector<MovedPositions> moved;               // onto the control, by part of the block
   bool only_turned = false;                        // nearly all pairs of images show no parallax
 };
 
-// Collective. `own` is the job's block. Verticals that are set aside leave it, and positions with an offset from the
-// control are moved (position_offset.h).
+// Collective. `own` is the job's block. Verticals that are set aside leave it, and positions that lie off the control
+// or off each other get a shift (position_offset.h, position_shifts.h).
 OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& record,
                                  const std::vector<std::string>& matches, Block& own);
 

@@ -92,6 +92,7 @@ std::function<std::string(const UnknownId&)> names_of(const Block& block) {
         return "camera '" + block.cameras[CameraIndex(id.index)].name + "'";
       case UnknownKind::kMount: {
         const Rig& rig = block.rigs[RigIndex(id.index)];
+        if (rig.is_group()) return "shift of the " + rig.name;
         const bool receiver = id.part == std::ssize(rig.cameras());
         return (receiver ? "receiver" : "mount " + std::to_string(id.part)) + " of rig '" + rig.name + "'";
       }

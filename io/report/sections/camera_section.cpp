@@ -159,11 +159,13 @@ std::string receivers_table(const BlockResult& result) {
     add(rig, "change of it [m]", receiver.lever_arm_change, receiver.lever_arm_sigma, 3);
     add(rig, "boresight [°]", receiver.boresight, receiver.boresight_sigma, 4);
   }
+  for (const ShiftFigures& group : shifts_of(result))
+    add(result.block.rigs[group.group].name, "shift [m]", group.shift, group.sigma, 3);
   if (table.empty()) return "";
   return "<h3>Receivers</h3>" +
          paragraph(
              "Position of the antenna and rotation vector of the observed attitudes, in the axes of the camera or "
-             "rig: x right, y down, z ahead.",
+             "rig: x right, y down, z ahead. Shift of a group of positions from the adjusted block: east, north, up.",
              "muted") +
          table.html();
 }

@@ -109,7 +109,9 @@ void put_rigs(Hdf5Writer& file, const IndexedVector<RigIndex, Rig>& rigs) {
   file.texts("rigs/name", column(rigs, [](const Rig& r) { return r.name; }));
   file.vector("rigs/mounts", column(rigs, [](const Rig& r) { return static_cast<std::int32_t>(r.mounts.size()); }),
               {"", "number of mounts: rows of the group 'mounts', in the order of the rigs"});
-  file.group("mounts", "one row per camera of a rig, and one for its receiver, if it has one");
+  file.group("mounts",
+             "one row per camera of a rig, and one for its receiver, if it has one; a rig without cameras is a group of "
+             "positions");
   file.vector("mounts/camera", column(mounts, [](const Mount& m) { return m.camera.value; }),
               {"", "row in cameras; -1: the receiver"});
   file.group("mounts/start");
@@ -155,6 +157,20 @@ void put_frame_priors(Hdf5Writer& file, const IndexedVector<FrameIndex, Frame>& 
               {"m", "east, north, up"});
   file.matrix("frames/position_prior/lever_arm", vectors3(frames, position(&PositionPrior::lever_arm)), 3,
               {"m", "antenna in the rig: antenna = C + R' lever_arm"});
+  file.vector("frames/position_prior/group",
+              column(frames,
+                     [](const Frame& f) {
+                       return f.position_prior ? f.position_prior->group.value : RigIndex().value;
+                     }),
+              {"", "row in rigs of the group with a shift of its own; -1: none"});
+  file.matrix("frames/position_prior/shifted",
+              vectors3(frames,
+                       [](const Frame& f) -> Eigen::Vector3d {
+                         return f.position_prior ? Eigen::Vector3d(f.position_prior->shifted.cast<double>())
+                                                 : absent_vector();
+                       }),
+              3,
+              {"", "1 for each axis along which the group is shifted"});
 
   file.group("frames/attitude_prior", "observed attitudes in the ground frame; rows of NaN: none");
   file.vector("frames/attitude_prior/present",
@@ -190,10 +206,17 @@ void get_position_priors(const Hdf5Reader& file, IndexedVector<FrameIndex, Frame
   const auto position = file.matrix<double>("frames/position_prior/position", 3, count);
   const auto sigma = file.matrix<double>("frames/position_prior/sigma", 3, count);
   const auto lever_arm = file.matrix<double>("frames/position_prior/lever_arm", 3, count);
+  std::vector<std::int64_t> group(frames.size(), RigIndex().value);  // earlier versions had no groups
+  std::vector<double> shifted(3 * frames.size(), 0);
+  if (file.has("frames/position_prior/group")) {
+    group = file.vector<std::int64_t>("frames/position_prior/group", count);
+    shifted = file.matrix<double>("frames/position_prior/shifted", 3, count);
+  }
   for (std::size_t i = 0; i < frames.size(); ++i)
     if (present[i])
-      frames[FrameIndex(static_cast<std::int64_t>(i))].position_prior =
-          PositionPrior{vector3(position, i), vector3(sigma, i), vector3(lever_arm, i)};
+      frames[FrameIndex(static_cast<std::int64_t>(i))].position_prior = PositionPrior{
+          vector3(position, i), vector3(sigma, i), vector3(lever_arm, i), RigIndex(group[i]),
+          vector3(shifted, i).cast<std::uint8_t>()};
 }
 
 void get_attitude_priors(const Hdf5Reader& file, IndexedVector<FrameIndex, Frame>& frames) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "io/block/observed_poses.h"
 #include "io/simulate/blocks/simulate.h"
 
 namespace megablock {
@@ -94,45 +95,53 @@ TEST(PositionOffset, NeedsThreePointsAndPositionsThatMayMove) {
   EXPECT_FALSE(held.find());
 }
 
-TEST(PositionOffset, IsRemovedFromPositionsAndBlock) {
+// The block moves, the positions stay, and their difference is the start of a shift.
+TEST(PositionOffset, BecomesTheShiftOfAllPositions) {
   OffsetBlock block({0, 0, 46.9});
-  const Eigen::Vector3d before = block.block.frames[FrameIndex(7)].position_prior->position;
+  const FrameIndex seventh(7);
+  const PositionPrior before = *block.block.frames[seventh].position_prior;
   const auto found = block.find();
   ASSERT_TRUE(found);
-  remove_offset(*found, block.frames, block.block.frames, block.state);
-  EXPECT_LT((block.state.frames[FrameIndex(7)].centre - block.truth.frames[FrameIndex(7)].centre).norm(), 0.1);
-  const PositionPrior& after = *block.block.frames[FrameIndex(7)].position_prior;
-  EXPECT_NEAR(before.z() - after.position.z(), 46.9, 0.1);
-  EXPECT_EQ(before.head<2>(), after.position.head<2>());
-  // Forty positions tell the datum a third as well as the control does.
-  EXPECT_NEAR(after.sigma.z() / std::sqrt(40.0), 3 * found->sigma.z(), 0.1 * found->sigma.z());
-  EXPECT_NEAR(after.sigma.x(), 0.02, 1e-12);
+  shift_positions(*found, block.frames, block.block, block.state);
+  EXPECT_LT((block.state.frames[seventh].centre - block.truth.frames[seventh].centre).norm(), 0.1);
+  const PositionPrior& after = *block.block.frames[seventh].position_prior;
+  EXPECT_EQ(after.position, before.position);
+  EXPECT_EQ(after.sigma, before.sigma);
+  ASSERT_TRUE(block.block.rigs.contains(after.group));
+  const Rig& group = block.block.rigs[after.group];
+  EXPECT_TRUE(group.is_group());
+  EXPECT_EQ(group.mounts.front().pose.centre, found->offset);
+  EXPECT_GT(group.mounts.front().position_sigma_m, 100);
+  EXPECT_EQ(block.state.mounts[after.group].front().centre, found->offset);
+  EXPECT_EQ(after.shifted, (Eigen::Matrix<std::uint8_t, 3, 1>(0, 0, 1)));
+  EXPECT_LT(
+      (corrected(after, block.block, RigIndex(0), block.state.mounts).position - (before.position - found->offset))
+          .norm(),
+      1e-12);
   EXPECT_FALSE(block.find());
+  EXPECT_NO_THROW(check(block.block));
 }
 
-// The orientation was wrong by 0.3 m; the adjusted block is where the control is, with 1 cm.
-TEST(PositionOffset, IsBetterKnownOfTheAdjustedBlock) {
-  OffsetBlock block({0, 0, 46.9}, 0.02);
-  MovedPositions moved{{}, block.frames};
-  moved.offset.offset.z() = 47.2;
-  remove_offset(moved.offset, block.frames, block.block.frames, block.state);
-  const IndexedVector<FrameIndex, Eigen::Vector3d> variances(block.frames.size(), Eigen::Vector3d::Constant(1e-4));
-  const PositionOffset found = adjusted_offset(moved, block.block, block.truth, variances);
-  EXPECT_EQ(found.offset.head<2>(), Eigen::Vector2d::Zero());
-  // Forty positions of 2 cm: the median has 4 mm.
-  EXPECT_NEAR(found.offset.z(), 46.9, 0.012);
-  EXPECT_NEAR(found.sigma.z(), std::hypot(0.01, 0.004), 0.001);
-  EXPECT_THAT(adjusted_offset_text(found),
-              testing::MatchesRegex("in the adjusted block the positions lie 46.[0-9]* m above the control points "
-                                    "[(]sigma 0.01[0-9]* m[)]"));
+// Half of the positions have a shift against the others already.
+TEST(PositionOffset, AddsToTheShiftOfAGroup) {
+  OffsetBlock block({0, 0, 46.9});
+  const std::vector<FrameIndex> half(block.frames.begin() + 20, block.frames.end());
+  for (const FrameIndex f : half) block.block.frames[f].position_prior->position.z() += 2;
+  add_position_group(half, {0, 0, 2}, {0, 0, 1}, block.block, block.state);
+  const auto found = block.find();
+  ASSERT_TRUE(found);
+  shift_positions(*found, block.frames, block.block, block.state);
+  for (const FrameIndex f : block.frames) {
+    const PositionPrior prior = *block.block.frames[f].position_prior;
+    const double expected = f.value < 20 ? 46.9 : 48.9;
+    EXPECT_NEAR(block.state.mounts[prior.group].front().centre.z(), expected, 0.1);
+  }
 }
 
 TEST(PositionOffset, IsSaidInWords) {
   PositionOffset found;
   found.offset = {0, 0, 46.9};
   found.sigma = {0, 0, 0.014};
-  found.before = {0, 0, 0.02};
-  found.after = {0, 0, 0.25};
   found.points = 6;
   EXPECT_THAT(offset_text(found),
               testing::StartsWith("the positions lie 46.90 m above the control points (sigma 0.01 m, "

@@ -12,6 +12,7 @@
 #include "adjust/terms/automatic_terms.h"
 #include "adjust/terms/build_problem.h"
 #include "io/block/frame_measurements.h"
+#include "io/block/observed_poses.h"
 #include "tests/support/adjust/known_lines.h"
 #include "tests/support/adjust/seen_verticals.h"
 #include "tests/support/adjust/single_tile.h"
@@ -41,6 +42,16 @@ SimulatedBlock block_with_all_types() {
     const Pose receiver{rotation_exp<double>(Eigen::Vector3d(0.2, -0.3, 0.1)), {0.3, 0.1, -0.5}};
     simulated.block.rigs[rig].mounts.push_back({CameraIndex(), receiver, 0.02, 0.1});
     simulated.truth.mounts[rig].push_back(receiver);
+  }
+  // Positions with a shift of their group, along all axes and along one.
+  for (const bool all : {true, false}) {
+    const RigIndex group = simulated.block.rigs.next_index();
+    simulated.block.rigs.push_back(position_group("positions", {1, -2, 3}, 0.5));
+    simulated.truth.mounts.push_back({simulated.block.rigs[group].mounts.front().pose});
+    for (std::int64_t f = all ? 0 : 1; f < std::ssize(simulated.block.frames); f += 3) {
+      simulated.block.frames[FrameIndex(f)].position_prior->group = group;
+      simulated.block.frames[FrameIndex(f)].position_prior->shifted = {all, all, 1};
+    }
   }
   for (Camera& camera : simulated.block.cameras) camera.prior_sigma[kFocal] = 5;
   for (const FrameMeasurementType& type : frame_measurement_types())
@@ -90,16 +101,23 @@ TEST(ObservationTypes, AreAllInTheBlock) {
 }
 
 // A receiver is a mount without images; positions and attitudes depend on it, and its prior is there once.
-TEST(ObservationTypes, DependOnTheReceiver) {
+TEST(ObservationTypes, DependOnTheReceiverAndTheGroups) {
   const Scene scene;
-  const std::int32_t receiver = static_cast<std::int32_t>(scene.problem.mounts.size()) - 1;
-  EXPECT_EQ(scene.problem.mounts.back().mount, 2);
-  EXPECT_EQ(scene.problem.mount_free.back(), 1);
+  ASSERT_EQ(scene.problem.mounts.size(), 5u);  // two cameras, the receiver, two groups
+  constexpr std::int32_t receiver = 2;
+  for (const std::int32_t mount : {receiver, receiver + 1, receiver + 2}) {
+    EXPECT_EQ(scene.problem.mounts[static_cast<std::size_t>(mount)].mount, mount == receiver ? 2 : 0);
+    EXPECT_EQ(scene.problem.mount_free[static_cast<std::size_t>(mount)], 1);
+    EXPECT_EQ(std::ranges::count(scene.problem.mount_priors, mount, &TileProblem::MountTerm::mount), 1);
+  }
   EXPECT_FALSE(scene.problem.positions.empty() || scene.problem.attitudes.empty());
-  for (const auto& term : scene.problem.positions) EXPECT_EQ(term.receiver, receiver);
+  for (const auto& term : scene.problem.positions) {
+    EXPECT_EQ(term.receiver, receiver);
+    const std::int64_t frame = scene.problem.frames[static_cast<std::size_t>(term.frame.value)].value;
+    EXPECT_EQ(term.group, frame % 3 == 2 ? -1 : receiver + 1 + frame % 3);
+  }
   for (const auto& term : scene.problem.attitudes) EXPECT_EQ(term.receiver, receiver);
-  for (const TileImage& image : scene.problem.images) EXPECT_NE(image.mount, receiver);
-  EXPECT_EQ(std::ranges::count(scene.problem.mount_priors, receiver, &TileProblem::MountTerm::mount), 1);
+  for (const TileImage& image : scene.problem.images) EXPECT_LT(image.mount, receiver);
 }
 
 TEST(ObservationTypes, HaveTheDerivativesOfFiniteDifferences) {
@@ -133,7 +151,8 @@ std::vector<std::vector<double>> blocks_of(const TermUnknowns& term, const TileS
   const auto add_pose = [&](const Pose& pose) { to_block(pose, blocks.emplace_back(kPoseBlock).data()); };
   for (int f = 0; f < term.frame_count; ++f)
     add_pose(state.frames[static_cast<std::size_t>(term.frame[static_cast<std::size_t>(f)])]);
-  if (term.mount >= 0) add_pose(state.mounts[static_cast<std::size_t>(term.mount)]);
+  for (const std::int32_t mount : term.mounts)
+    if (mount >= 0) add_pose(state.mounts[static_cast<std::size_t>(mount)]);
   if (term.camera >= 0) {
     const Intrinsics& camera = state.cameras[static_cast<std::size_t>(term.camera)];
     blocks.emplace_back(camera.begin(), camera.end());
@@ -166,7 +185,7 @@ TEST(ObservationTypes, HaveTheResidualsThatCeresHas) {
         EXPECT_NEAR(part.squares, part.residual.squaredNorm(), 1e-12 * (1 + part.squares));
         for (int b = 0; b < part.block_count; ++b) {
           const LinearTerm::Block& block = part.blocks[static_cast<std::size_t>(b)];
-          const bool stated = block.by == LinearTerm::By::kMount    ? block.row == unknowns.mount
+          const bool stated = block.by == LinearTerm::By::kMount    ? std::ranges::count(unknowns.mounts, block.row) > 0
                               : block.by == LinearTerm::By::kCamera ? block.row == unknowns.camera
                                                                     : std::ranges::count(unknowns.frame, block.row) > 0;
           EXPECT_TRUE(stated) << "type " << t << ": a derivative by what unknowns() does not list";

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "geometry/transform/rotation.h"
+#include "io/block/observed_poses.h"
 
 namespace megablock {
 namespace {
@@ -154,6 +155,30 @@ TEST(Receivers, AreShownWithTheGivenLeverArm) {
   EXPECT_TRUE(receivers[0].boresight_sigma.isZero());
   EXPECT_TRUE(receivers[0].lever_arm_change.isApprox(Eigen::Vector3d(0.2, 0, 0)));
   EXPECT_TRUE(receivers[0].lever_arm_sigma.isApprox(Eigen::Vector3d::Constant(0.01)));
+}
+
+// A group that is shifted in height, known to 2 cm.
+TEST(Receivers, ShiftsAreShownAlongTheirAxes) {
+  SeenFromRig block(1, 0);
+  BlockResult& result = block.result;
+  result.state.mounts.push_back({Pose{}});
+  result.mount_covariance.push_back({BlockResult::Matrix6::Zero()});
+  EXPECT_THAT(shifts_of(result), IsEmpty());
+  result.block.rigs.push_back(position_group("positions of a.jpg and 8 more", {0, 0, 47}, 470));
+  result.state.mounts.push_back({Pose{Eigen::Quaterniond::Identity(), {0.1, 0.2, 46.9}}});
+  result.mount_covariance.push_back({4e-4 * BlockResult::Matrix6::Identity()});
+  EXPECT_THAT(shifts_of(result), IsEmpty());  // no position belongs to it
+  PositionPrior prior;
+  prior.group = RigIndex(1);
+  prior.shifted = {0, 0, 1};
+  result.block.frames[FrameIndex(0)].position_prior = prior;
+  const std::vector<ShiftFigures> shifts = shifts_of(result);
+  ASSERT_EQ(shifts.size(), 1u);
+  EXPECT_EQ(shifts[0].shift, Eigen::Vector3d(0, 0, 46.9));
+  EXPECT_LT((shifts[0].sigma - Eigen::Vector3d(0, 0, 0.02)).norm(), 1e-12);
+  EXPECT_EQ(shift_text(result, shifts[0]),
+            "in the adjusted block the positions of a.jpg and 8 more lie 46.90 m above it (sigma 0.02 m)");
+  EXPECT_THAT(receivers_of(result), IsEmpty());
 }
 
 }  // namespace

@@ -253,6 +253,29 @@ TEST(Project, FreesLeverArmsAndBoresights) {
               HasSubstr("boresight_sigma_deg"));
 }
 
+// Positions of images that match a pattern have a shift in common.
+TEST(Project, GroupsPositions) {
+  ScratchDirectory folder;
+  write_line(folder, 3);
+  const Block block =
+      read_text(folder, "images: images\ngps: {groups: ['*1*', '*'], group_sigma_m: 5}\n").block;
+  ASSERT_EQ(block.rigs.size(), 3u);
+  for (RigIndex rig(1); block.rigs.contains(rig); ++rig.value) {
+    EXPECT_TRUE(block.rigs[rig].is_group());
+    EXPECT_EQ(block.rigs[rig].mounts.front().position_sigma_m, 5);
+  }
+  for (ImageIndex i(0); block.images.contains(i); ++i.value) {
+    const PositionPrior& prior = *block.frames[block.images[i].frame].position_prior;
+    EXPECT_EQ(prior.group, RigIndex(block.name_of(i).find('1') != std::string::npos ? 1 : 2)) << block.name_of(i);
+    EXPECT_EQ(prior.shifted.cast<int>().sum(), 3);
+  }
+  EXPECT_NO_THROW(check(block));
+  EXPECT_THAT(refusal(folder, "images: images\ngps: {groups: ['flight2/*']}\n"),
+              HasSubstr("no image with a position matches 'flight2/*'"));
+  EXPECT_THAT(refusal(folder, "images: images\ngps: {groups: ['*', '*1*']}\n"), HasSubstr("matches '*1*'"));
+  EXPECT_THAT(refusal(folder, "images: images\ngps: {groups: ['*'], group_sigma_m: 0}\n"), HasSubstr("group_sigma_m"));
+}
+
 // For the report's list of options: as they were written.
 TEST(Project, KeepsWhatIsSaidOfPositionsAndAttitudes) {
   ScratchDirectory folder;

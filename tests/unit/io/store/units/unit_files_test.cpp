@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "io/base/error.h"
+#include "io/block/observed_poses.h"
 #include "io/store/hdf5/hdf5_file.h"
 #include "io/store/units/block_file.h"
 #include "io/store/units/state_file.h"
@@ -41,6 +42,8 @@ void expect_equal(const Frame& a, const Frame& b) {
     EXPECT_TRUE(same_bits(a.position_prior->position, b.position_prior->position));
     EXPECT_TRUE(same_bits(a.position_prior->sigma, b.position_prior->sigma));
     EXPECT_TRUE(same_bits(a.position_prior->lever_arm, b.position_prior->lever_arm));
+    EXPECT_EQ(a.position_prior->group, b.position_prior->group);
+    EXPECT_EQ(a.position_prior->shifted, b.position_prior->shifted);
   }
   ASSERT_EQ(a.attitude_prior.has_value(), b.attitude_prior.has_value());
   if (a.attitude_prior) {
@@ -134,6 +137,16 @@ class UnitFiles : public ::testing::Test {
 TEST_F(UnitFiles, BlockComesBack) {
   write_block(path_, example_block());
   expect_equal(read_block(path_), example_block());
+}
+
+TEST_F(UnitFiles, GroupOfPositionsComesBack) {
+  Block block = example_block();
+  PositionPrior& prior = *block.frames[FrameIndex(0)].position_prior;
+  prior.group = block.rigs.next_index();
+  prior.shifted = {1, 0, 1};
+  block.rigs.push_back(position_group("positions of a day", {1, 2, 3}, 0.5));
+  write_block(path_, block);
+  expect_equal(read_block(path_), block);
 }
 
 TEST_F(UnitFiles, EmptyBlockComesBack) {
