@@ -37,6 +37,7 @@ void remove_datum(Block& block) {
 // is limited by the size of the rig, so that it also holds the scale of a small rig. A receiver is no part of the
 // calibration of a rig and stays as the project gives it.
 void free_mounts(Rig& rig, bool all, const RigCalibrationOptions& options) {
+  if (rig.is_group()) return;
   double extent = 0;
   for (const Mount& mount : rig.cameras())
     extent = std::max(extent, (mount.pose.centre - rig.mounts[0].pose.centre).norm());
@@ -77,7 +78,7 @@ Block calibration_block(Block block, const RigCalibrationOptions& options) {
   if (options.mode == CalibrationMode::kOnLine) remove_datum(block);
   for (Rig& rig : block.rigs) free_mounts(rig, options.mounts == MountFreedom::kFree, options);
   const bool any = std::any_of(block.rigs.begin(), block.rigs.end(), [](const Rig& rig) {
-    return std::any_of(rig.mounts.begin(), rig.mounts.end(), [](const Mount& mount) { return !mount.held(); });
+    return std::ranges::any_of(rig.cameras(), [](const Mount& mount) { return !mount.held(); });
   });
   if (!any)
     throw InputError(
@@ -97,6 +98,7 @@ Block with_rig_held(Block block, const BlockState& rig) {
     for (std::size_t m = 0; m < block.rigs[r].mounts.size(); ++m) {
       Mount& mount = block.rigs[r].mounts[m];
       mount.pose = rig.mounts[r][m];
+      if (block.rigs[r].is_group()) continue;
       mount.position_sigma_m = mount.rotation_sigma_rad = 0;
     }
   return block;

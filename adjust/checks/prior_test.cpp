@@ -130,8 +130,11 @@ class PriorTester {
   static std::size_t row(const TileProblem::PositionTerm& term) { return static_cast<std::size_t>(term.frame.value); }
   static std::size_t row(const TileProblem::PointTerm& term) { return static_cast<std::size_t>(term.point.value); }
 
-  // Whether the observation is uncertain and the block knows its place.
-  bool tells(const TileProblem::PositionTerm& term) const { return !held(term.prior) && !frames_[row(term)].isZero(); }
+  // Whether the observation is uncertain and the block knows its place. The errors of a shift and of the frames of its
+  // group are nearly the same, and their covariance is not among `frames`: such positions are not tested.
+  bool tells(const TileProblem::PositionTerm& term) const {
+    return !held(term.prior) && term.group < 0 && !frames_[row(term)].isZero();
+  }
   bool tells(const TileProblem::PointTerm& term) const { return !held(term) && problem_.active(term.point.value); }
 
   // `loss`: empty for an observation that takes no part.

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "adjust/terms/linearise.h"
+#include "io/block/observed_poses.h"
 
 namespace megablock {
 
@@ -108,9 +109,9 @@ class TrajectoryAdjuster {
     Agreement of_position, of_attitude, of_tie;
     for (std::size_t k = 0; k < poses_.size(); ++k) {
       const FrameIndex frame = trajectory_.frames[k];
-      if (const auto* prior = position(frame))
+      if (const auto prior = position(frame))
         of_position.add(linearise_position(poses_[k], *prior).residual.squaredNorm(), 3);
-      if (const auto* prior = attitude(frame))
+      if (const auto prior = attitude(frame))
         of_attitude.add(linearise_attitude(poses_[k], *prior).residual.squaredNorm(), 3);
       if (k + 1 < poses_.size()) of_tie.add(tie_at(k).residual.squaredNorm(), 6);
     }
@@ -148,13 +149,15 @@ class TrajectoryAdjuster {
   };
   static constexpr std::size_t kPiece = 256;  // frames
 
-  const PositionPrior* position(FrameIndex frame) const {
+  std::optional<PositionPrior> position(FrameIndex frame) const {
     const auto& prior = block_.frames[frame].position_prior;
-    return use_.use_position_priors && prior ? &*prior : nullptr;
+    if (!use_.use_position_priors || !prior) return std::nullopt;
+    return loosened(*prior, block_, block_.frames[frame].rig);
   }
-  const AttitudePrior* attitude(FrameIndex frame) const {
+  std::optional<AttitudePrior> attitude(FrameIndex frame) const {
     const auto& prior = block_.frames[frame].attitude_prior;
-    return use_.use_attitude_priors && prior ? &*prior : nullptr;
+    if (!use_.use_attitude_priors || !prior) return std::nullopt;
+    return loosened(*prior, block_, block_.frames[frame].rig);
   }
 
   struct Tie {
@@ -176,8 +179,8 @@ class TrajectoryAdjuster {
     double sum = 0;
     const auto add = [&](const auto& residual) { sum += loss.evaluate(residual.squaredNorm())[0]; };
     for (std::size_t k = 0; k < poses.size(); ++k) {
-      if (const auto* prior = position(trajectory_.frames[k])) add(linearise_position(poses[k], *prior).residual);
-      if (const auto* prior = attitude(trajectory_.frames[k])) add(linearise_attitude(poses[k], *prior).residual);
+      if (const auto prior = position(trajectory_.frames[k])) add(linearise_position(poses[k], *prior).residual);
+      if (const auto prior = attitude(trajectory_.frames[k])) add(linearise_attitude(poses[k], *prior).residual);
       if (k + 1 < poses.size()) add(tie_between(k, poses[k], poses[k + 1]).residual);
     }
     return sum;
@@ -195,8 +198,8 @@ class TrajectoryAdjuster {
   Eliminated eliminate(std::size_t k, const RobustLoss& loss, Carried& carried) const {
     constexpr double kDamping = 1e-8;  // keeps the matrix regular where nothing observes a component
     const FrameIndex frame = trajectory_.frames[k];
-    if (const auto* prior = position(frame)) add_prior(linearise_position(poses_[k], *prior), loss, carried);
-    if (const auto* prior = attitude(frame)) add_prior(linearise_attitude(poses_[k], *prior), loss, carried);
+    if (const auto prior = position(frame)) add_prior(linearise_position(poses_[k], *prior), loss, carried);
+    if (const auto prior = attitude(frame)) add_prior(linearise_attitude(poses_[k], *prior), loss, carried);
     Carried next;
     Matrix6 coupling = Matrix6::Zero();
     if (k + 1 < poses_.size()) {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
+#include <map>
 
 #include "adjust/orientation/steps/control_marks.h"
 #include "geometry/numbers/median.h"
@@ -20,7 +20,8 @@ namespace {
 constexpr std::size_t kFewestPoints = 3;
 constexpr double kOfOwnSigma = 3, kOfPosition = 5, kOfScatter = 3;  // times these an offset counts
 constexpr double kNormal = 1.4826, kOfMedian = 1.2533;              // sigma over median of |r|; sigma of a median
-constexpr double kKnown = kUnknownHeightSigma / 2;                  // metres
+constexpr double kLoose = 10;  // lengths of an offset: the sigma of a shift that shall tell nothing
+constexpr double kKnown = kUnknownHeightSigma / 2;  // metres
 
 bool has_position(const Block& block, const BlockState& state, FrameIndex frame) {
   return state.oriented[frame] && block.frames[frame].position_prior.has_value();
@@ -110,33 +111,55 @@ std::optional<PositionOffset> find_position_offset(const Block& block, const Blo
   return found;
 }
 
+namespace {
+
+using ShiftAxes = Eigen::Matrix<std::uint8_t, 3, 1>;
+
+// A group may have positions in another part of the block, which keep their shift: those of `frames` then become a
+// group of their own.
+void shift_group(const PositionOffset& offset, const std::vector<FrameIndex>& frames, const ShiftAxes& axes,
+                 Block& block, BlockState& state) {
+  const RigIndex before = block.frames[frames.front()].position_prior->group;
+  const auto is_member = [&](const Frame& frame) {
+    return frame.position_prior && frame.position_prior->group == before;
+  };
+  RigIndex group = before;
+  if (std::ranges::count_if(block.frames, is_member) > std::ssize(frames)) {
+    group = block.rigs.next_index();
+    block.rigs.push_back(block.rigs[before]);
+    block.rigs[group].name += " in part " + std::to_string(group.value);
+    state.mounts.push_back(state.mounts[before]);
+  }
+  Mount& mount = block.rigs[group].mounts.front();
+  mount.pose.centre += offset.offset;
+  mount.position_sigma_m = std::hypot(mount.position_sigma_m, kLoose * offset.offset.norm());
+  state.mounts[group].front().centre += offset.offset;
+  for (const FrameIndex frame : frames) {
+    PositionPrior& prior = *block.frames[frame].position_prior;
+    prior.group = group;
+    prior.shifted = prior.shifted.cwiseMax(axes);
+  }
+}
+
+}  // namespace
+
 void shift_positions(const PositionOffset& offset, const std::vector<FrameIndex>& frames, Block& block,
                      BlockState& state) {
-  std::vector<FrameIndex> alone;  // without a group
-  std::set<RigIndex> groups;
+  std::map<RigIndex, std::vector<FrameIndex>> by_group;
   for (const FrameIndex frame : frames) {
     if (state.oriented[frame]) state.frames[frame].centre -= offset.offset;
-    const auto& prior = block.frames[frame].position_prior;
-    if (!prior) continue;
-    if (prior->group.valid())
-      groups.insert(prior->group);
+    if (const auto& prior = block.frames[frame].position_prior) by_group[prior->group].push_back(frame);
+  }
+  const ShiftAxes axes = (offset.offset.array() != 0).cast<std::uint8_t>();
+  for (const auto& [group, members] : by_group)
+    if (group.valid())
+      shift_group(offset, members, axes, block, state);
     else
-      alone.push_back(frame);
-  }
-  const Eigen::Matrix<std::uint8_t, 3, 1> axes = (offset.offset.array() != 0).cast<std::uint8_t>();
-  for (const RigIndex group : groups) {
-    block.rigs[group].mounts.front().pose.centre += offset.offset;
-    state.mounts[group].front().centre += offset.offset;
-  }
-  for (const FrameIndex frame : frames)
-    if (auto& prior = block.frames[frame].position_prior; prior && prior->group.valid())
-      prior->shifted = prior->shifted.cwiseMax(axes);
-  if (!alone.empty()) add_position_group(alone, offset.offset, axes, block, state);
+      add_position_group(members, offset.offset, axes, block, state);
 }
 
 void add_position_group(const std::vector<FrameIndex>& frames, const Eigen::Vector3d& offset,
                         const Eigen::Matrix<std::uint8_t, 3, 1>& axes, Block& block, BlockState& state) {
-  constexpr double kLoose = 10;  // lengths of the offset: its sigma shall tell nothing
   const RigIndex group = block.rigs.next_index();
   for (const FrameIndex frame : frames) {
     PositionPrior& prior = *block.frames[frame].position_prior;

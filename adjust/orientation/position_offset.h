@@ -42,7 +42,7 @@ std::optional<PositionOffset> find_position_offset(const Block& block, const Blo
                                                    const std::vector<FrameIndex>& frames);
 
 // Moves the frames by the offset, and gives it to their positions as the start of a shift. A group that has a shift
-// already keeps its own, larger by the offset.
+// already keeps its own, larger by the offset; its positions outside `frames` keep theirs.
 void shift_positions(const PositionOffset& offset, const std::vector<FrameIndex>& frames, Block& block,
                      BlockState& state);
 

@@ -10,6 +10,7 @@
 #include <numeric>
 #include <optional>
 
+#include "geometry/numbers/decompositions.h"
 #include "geometry/numbers/median.h"
 #include "io/block/held_priors.h"
 #include "io/text/counted.h"
@@ -49,56 +50,153 @@ struct ShiftFit {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero(), scatter = Eigen::Vector3d::Zero();  // of |r|; s
 };
 
-std::optional<ShiftFit> fit(const std::vector<AntennaPair>& pairs, const Division& division) {
-  const std::size_t groups = division.names.size();
-  std::vector<double> weights(pairs.size(), 1);
-  std::vector<double> sigmas;
-  for (const AntennaPair& pair : pairs) sigmas.push_back(pair.sigma.minCoeff());
-  const double least = 0.1 * median(std::move(sigmas));
-  ShiftFit fitted;
-  for (int iteration = 0; iteration < kReweightings; ++iteration) {
+// The similarity and the offsets of a division.
+class ShiftFitter {
+ public:
+  ShiftFitter(const std::vector<AntennaPair>& pairs, const Division& division)
+      : division_(division), weights_(pairs.size(), 1) {
+    std::vector<double> sigmas;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      sigmas.push_back(pairs[i].sigma.minCoeff());
+      if (division.group[i] >= 0) used_.push_back({i, static_cast<std::size_t>(division.group[i]), &pairs[i]});
+    }
+    least_m_ = 0.1 * median(std::move(sigmas));
+    fitted_.residuals.assign(pairs.size(), Eigen::Vector3d::Zero());
+  }
+
+  std::optional<ShiftFit> run() {
+    for (int iteration = 0; iteration < kReweightings; ++iteration)
+      if (!solve()) return std::nullopt;
+    measure();
+    return std::move(fitted_);
+  }
+
+ private:
+  struct Used {
+    std::size_t row, group;
+    const AntennaPair* pair;
+  };
+
+  void find_centroids() {
+    const std::size_t groups = division_.names.size();
+    in_block_.assign(groups, Eigen::Vector3d::Zero());
+    observed_ = in_block_;
     std::vector<double> sum(groups, 0);
-    std::vector<Eigen::Vector3d> x(groups, Eigen::Vector3d::Zero()), p = x;
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      if (division.group[i] < 0) continue;
-      const auto g = static_cast<std::size_t>(division.group[i]);
-      sum[g] += weights[i];
-      x[g] += weights[i] * pairs[i].in_block;
-      p[g] += weights[i] * pairs[i].observed;
+    for (const Used& used : used_) {
+      sum[used.group] += weights_[used.row];
+      in_block_[used.group] += weights_[used.row] * used.pair->in_block;
+      observed_[used.group] += weights_[used.row] * used.pair->observed;
     }
-    for (std::size_t g = 0; g < groups; ++g) x[g] /= sum[g], p[g] /= sum[g];
+    for (std::size_t g = 0; g < groups; ++g) in_block_[g] /= sum[g], observed_[g] /= sum[g];
+  }
+
+  // One solution with the present weights, and the weights of the next one.
+  bool solve() {
+    find_centroids();
     std::vector<Eigen::Vector3d> from, to;
-    std::vector<double> used;
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      if (division.group[i] < 0) continue;
-      const auto g = static_cast<std::size_t>(division.group[i]);
-      from.push_back(pairs[i].in_block - x[g]);
-      to.push_back(pairs[i].observed - p[g]);
-      used.push_back(weights[i]);
+    std::vector<double> weights;
+    for (const Used& used : used_) {
+      from.push_back(used.pair->in_block - in_block_[used.group]);
+      to.push_back(used.pair->observed - observed_[used.group]);
+      weights.push_back(weights_[used.row]);
     }
-    auto turn = fit_similarity(from, to, used);
-    if (!turn) return std::nullopt;
+    keep_attitude(from, to, weights);
+    auto turn = fit_similarity(from, to, weights);
+    if (!turn) return false;
     turn->translation.setZero();
-    fitted.similarity = *turn;
-    fitted.similarity.translation = p[0] - (*turn)(x[0]);
-    fitted.offsets.clear();
-    for (std::size_t g = 0; g < groups; ++g) fitted.offsets.push_back((p[g] - p[0]) - (*turn)(x[g] - x[0]));
-    fitted.residuals.assign(pairs.size(), Eigen::Vector3d::Zero());
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      if (division.group[i] < 0) continue;
-      const auto g = static_cast<std::size_t>(division.group[i]);
-      fitted.residuals[i] = (pairs[i].observed - p[g]) - (*turn)(pairs[i].in_block - x[g]);
-      weights[i] = 1 / std::max(fitted.residuals[i].norm(), least);
+    std::vector<double> lengths;
+    for (std::size_t i = 0; i < used_.size(); ++i) {
+      const Eigen::Vector3d residual = to[i] - (*turn)(from[i]);
+      fitted_.residuals[used_[i].row] = residual;
+      lengths.push_back(residual.norm());
+      weights_[used_[i].row] = 1 / std::max(lengths.back(), least_m_);
+    }
+    usual_m_ = median(std::move(lengths));
+    fitted_.offsets.clear();
+    for (std::size_t g = 0; g < observed_.size(); ++g)
+      fitted_.offsets.push_back((observed_[g] - observed_[0]) - (*turn)(in_block_[g] - in_block_[0]));
+    turn->translation = observed_[0] - (*turn)(in_block_[0]);
+    fitted_.similarity = *turn;
+    return true;
+  }
+
+  // Positions on a line do not tell the turn about it, and their errors would. Six further pairs say that the block
+  // keeps its attitude, with the information that the errors feign.
+  void keep_attitude(std::vector<Eigen::Vector3d>& from, std::vector<Eigen::Vector3d>& to,
+                     std::vector<double>& weights) const {
+    constexpr double kLeast = 1e-6;  // of the length
+    double all = 0, squares = 0;
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      all += weights[i];
+      squares += weights[i] * from[i].squaredNorm();
+    }
+    const double length = std::sqrt(squares / all);
+    const double weight = all * std::pow(std::max(usual_m_ / length, kLeast), 2) / 4;
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double end : {-length, length}) {
+        from.emplace_back(end * Eigen::Vector3d::Unit(axis));
+        to.push_back(from.back());
+        weights.push_back(weight);
+      }
+  }
+
+  void measure() {
+    for (int k = 0; k < 3; ++k) {
+      std::vector<double> lengths;
+      for (const Used& used : used_) lengths.push_back(std::abs(fitted_.residuals[used.row][k]));
+      fitted_.mean[k] = std::accumulate(lengths.begin(), lengths.end(), 0.0) / static_cast<double>(lengths.size());
+      fitted_.scatter[k] = kMadToSigma * median(std::move(lengths));
     }
   }
+
+  const Division& division_;
+  std::vector<Used> used_;                            // pairs of a group
+  std::vector<double> weights_;                       // [pairs]
+  double least_m_ = 0;                                // of a residual, for its weight
+  double usual_m_ = 0;                                // median length of the residuals
+  std::vector<Eigen::Vector3d> in_block_, observed_;  // [groups] centroids
+  ShiftFit fitted_;
+};
+
+std::optional<ShiftFit> fit(const std::vector<AntennaPair>& pairs, const Division& division) {
+  return ShiftFitter(pairs, division).run();
+}
+
+// Polynomials of the second order in the two directions in which the block extends most, [pairs x terms].
+Eigen::MatrixXd bends(const std::vector<AntennaPair>& pairs) {
+  constexpr std::size_t kFewestForBend = 12;  // positions
+  const auto n = static_cast<Eigen::Index>(pairs.size());
+  Eigen::MatrixX3d places(n, 3);
+  for (Eigen::Index i = 0; i < n; ++i) places.row(i) = pairs[static_cast<std::size_t>(i)].in_block.transpose();
+  places.rowwise() -= places.colwise().mean().eval();
+  const SymmetricEigen3 spread = symmetric_eigen3(places.transpose() * places / static_cast<double>(n));
+  std::array<int, 3> axes{0, 1, 2};
+  std::ranges::sort(axes, std::ranges::greater(), [&](int axis) { return spread.values[axis]; });
+  places /= std::sqrt(std::max(spread.values[axes[0]], 1e-12));
+  const Eigen::ArrayXd u = places * spread.vectors.col(axes[0]), v = places * spread.vectors.col(axes[1]);
+  Eigen::MatrixXd all(n, 6);
+  all << Eigen::ArrayXd::Ones(n), u, v, u * u, u * v, v * v;
+  return pairs.size() < kFewestForBend ? Eigen::MatrixXd(all.leftCols(1)) : all;
+}
+
+// The mean length of the residuals along each axis that a bend of the block leaves, with weights as those of the fit.
+Eigen::Vector3d mean_beside_bend(const std::vector<AntennaPair>& pairs, const std::vector<Eigen::Vector3d>& residuals) {
+  constexpr double kRidge = 1e-9, kLeast = 1e-6;
+  const Eigen::MatrixXd basis = bends(pairs);
+  const auto n = static_cast<Eigen::Index>(pairs.size());
+  Eigen::Vector3d means;
   for (int k = 0; k < 3; ++k) {
-    std::vector<double> lengths;
-    for (std::size_t i = 0; i < pairs.size(); ++i)
-      if (division.group[i] >= 0) lengths.push_back(std::abs(fitted.residuals[i][k]));
-    fitted.mean[k] = std::accumulate(lengths.begin(), lengths.end(), 0.0) / static_cast<double>(lengths.size());
-    fitted.scatter[k] = kMadToSigma * median(std::move(lengths));
+    Eigen::VectorXd along(n), weights = Eigen::VectorXd::Ones(n), left;
+    for (Eigen::Index i = 0; i < n; ++i) along[i] = residuals[static_cast<std::size_t>(i)][k];
+    for (int iteration = 0; iteration < kReweightings; ++iteration) {
+      Eigen::MatrixXd normal = basis.transpose() * weights.asDiagonal() * basis;
+      normal.diagonal().array() += kRidge * normal.trace();
+      left = along - basis * solve_symmetric(normal, basis.transpose() * weights.asDiagonal() * along);
+      weights = left.cwiseAbs().cwiseMax(kLeast).cwiseInverse();
+    }
+    means[k] = left.cwiseAbs().mean();
   }
-  return fitted;
+  return means;
 }
 
 // Numbers the groups by their size. Positions of small groups take no part. Empty where one group is left.
@@ -126,14 +224,13 @@ std::optional<Division> division_by(const std::vector<std::string>& names, bool 
 
 class ShiftFinder {
  public:
-  ShiftFinder(const Block& block, const BlockState& state, const std::vector<FrameIndex>& frames)
-      : block_(block), image_of_(block.frames.size(), ImageIndex()) {
-    for (ImageIndex i(0); block.images.contains(i); ++i.value)
-      if (ImageIndex& image = image_of_[block.images[i].frame]; !image.valid()) image = i;
+  ShiftFinder(const Block& block, const BlockState& state, const std::vector<FrameIndex>& frames) : block_(block) {
     std::array<std::vector<double>, 3> sigmas;
     for (const FrameIndex f : frames) {
       const Frame& frame = block.frames[f];
-      if (!state.oriented[f] || !takes_part(frame)) continue;
+      if (!state.oriented[f]) continue;
+      any_held_ |= is_held(frame);
+      if (!takes_part(frame)) continue;
       const PositionPrior prior = corrected(*frame.position_prior, block, frame.rig, state.mounts);
       pairs_.push_back({f, prior.position + difference(state.frames[f], prior), prior.position, prior.sigma});
       for (std::size_t k = 0; k < 3; ++k) sigmas[k].push_back(prior.sigma[static_cast<int>(k)]);
@@ -142,15 +239,19 @@ class ShiftFinder {
   }
 
   PositionShifts run() {
-    if (pairs_.size() < 2 * kFewestOfShift) return {};
+    if (any_held_ || pairs_.size() < 2 * kFewestOfShift) return {};
     Division all;
     all.group.assign(pairs_.size(), 0);
     all.names = {""};
     const auto alone = fit(pairs_, all);
     if (!alone) return {};
     alone_ = *alone;
-    for (const auto& names : {by_folder(), by_rig(), by_flight()}) consider(division_by(names, false));
-    if (pairs_.size() <= kMostChosen) {
+    without_groups_ = alone_.mean.cwiseMin(mean_beside_bend(pairs_, alone_.residuals));
+    consider(division_by(by_folder(), false));
+    consider(division_by(by_rig(), false));
+    consider(division_by(by_flight(), false));
+    // What is known of the images explains more than what their residuals are sorted by.
+    if (!best_ && pairs_.size() <= kMostChosen) {
       consider_moments();
       consider_heaps();
     }
@@ -158,15 +259,22 @@ class ShiftFinder {
   }
 
  private:
+  static bool is_held(const Frame& frame) {
+    return (frame.position_prior && held(*frame.position_prior)) ||
+           (frame.attitude_prior && held(*frame.attitude_prior));
+  }
   static bool takes_part(const Frame& frame) {
     const auto& prior = frame.position_prior;
-    return prior && !held(*prior) && !prior->group.valid() && prior->sigma.maxCoeff() < kUnknownHeightSigma / 2;
+    return prior && !prior->group.valid() && prior->sigma.maxCoeff() < kUnknownHeightSigma / 2;
   }
 
   std::vector<std::string> by_folder() const {
+    IndexedVector<FrameIndex, ImageIndex> first(block_.frames.size(), ImageIndex());  // image of each frame
+    for (ImageIndex i(0); block_.images.contains(i); ++i.value)
+      if (ImageIndex& image = first[block_.images[i].frame]; !image.valid()) image = i;
     std::vector<std::string> names;
     for (const AntennaPair& pair : pairs_) {
-      const ImageIndex image = image_of_[pair.frame];
+      const ImageIndex image = first[pair.frame];
       const std::string name = image.valid() ? block_.name_of(image) : std::string();
       const auto slash = name.rfind('/');
       names.push_back("folder '" + (slash == std::string::npos ? std::string(".") : name.substr(0, slash)) + "'");
@@ -179,35 +287,47 @@ class ShiftFinder {
       names.push_back("rig '" + block_.rigs[block_.frames[pair.frame].rig].name + "'");
     return names;
   }
+  // Those without a time come last, in the order of the block.
   std::vector<std::size_t> in_time() const {
     std::vector<std::size_t> order(pairs_.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    if (std::ranges::all_of(pairs_, [&](const AntennaPair& pair) { return std::isfinite(time(pair)); }))
-      std::ranges::stable_sort(order, {}, [&](std::size_t i) { return time(pairs_[i]); });
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) {
+      return std::isfinite(time(i)) ? time(i) : std::numeric_limits<double>::infinity();
+    });
     return order;
   }
-  double time(const AntennaPair& pair) const { return block_.frames[pair.frame].time_s; }
+  double time(std::size_t pair) const { return block_.frames[pairs_[pair].frame].time_s; }
   std::vector<std::string> by_flight() const {
     std::vector<std::string> names(pairs_.size());
     int flight = 1;
-    double before = std::numeric_limits<double>::quiet_NaN();
+    double before = std::numeric_limits<double>::infinity();
     for (const std::size_t i : in_time()) {
-      if (time(pairs_[i]) - before > kGap_s) ++flight;
-      before = time(pairs_[i]);
-      if (std::isfinite(before)) names[i] = "flight " + std::to_string(flight);
+      if (!std::isfinite(time(i))) continue;
+      if (time(i) - before > kGap_s) ++flight;
+      before = time(i);
+      names[i] = "flight " + std::to_string(flight);
     }
     return names;
   }
+
+  // Moments at equal steps, then nearer and nearer to the best of them.
   void consider_moments() {
     const std::vector<std::size_t> order = in_time();
-    const std::size_t step = std::max<std::size_t>(1, order.size() / kMostMoments);
-    for (std::size_t first = kFewestOfShift; first + kFewestOfShift <= order.size(); first += step) {
-      std::vector<std::string> names(pairs_.size(), "images before " + name(order[first]));
-      for (std::size_t i = first; i < order.size(); ++i) names[order[i]] = "images from " + name(order[first]) + " on";
-      consider(division_by(names, true));
-    }
+    const std::size_t last = order.size() - kFewestOfShift;
+    std::size_t step = (order.size() + kMostMoments - 1) / kMostMoments, best = 0;
+    for (std::size_t first = kFewestOfShift; first <= last; first += step)
+      if (consider_moment(order, first)) best = first;
+    for (; best > 0 && step > 1; step = (step + 1) / 2)
+      for (const std::size_t first :
+           {best - std::min(best - kFewestOfShift, step / 2), std::min(last, best + step / 2)})
+        if (consider_moment(order, first)) best = first;
   }
-  std::string name(std::size_t pair) const { return block_.frames[pairs_[pair].frame].name; }
+  bool consider_moment(const std::vector<std::size_t>& order, std::size_t first) {
+    std::vector<std::string> names(pairs_.size(), "images before " + name(order[first]));
+    for (std::size_t i = first; i < order.size(); ++i) names[order[i]] = "images from " + name(order[first]) + " on";
+    return consider(division_by(names, true));
+  }
+  const std::string& name(std::size_t pair) const { return block_.frames[pairs_[pair].frame].name; }
 
   // The cut along each axis that leaves the least squares within the two sides (Otsu 1979), in the residuals without
   // groups; then twice again in those of the groups that were found, with their offsets.
@@ -218,7 +338,8 @@ class ShiftFinder {
       for (int again = 0; again < 3; ++again) {
         const double cut = best_cut(along);
         std::vector<std::string> names;
-        for (const double r : along) names.emplace_back(r < cut ? "lower" : "upper");
+        for (const double r : along)
+          names.emplace_back(r < cut ? "residuals on one side" : "residuals on the other side");
         const auto division = division_by(names, true);
         const auto fitted = division ? fit(pairs_, *division) : std::nullopt;
         if (!fitted) break;
@@ -233,8 +354,9 @@ class ShiftFinder {
     const auto n = static_cast<double>(along.size());
     const double all = std::accumulate(along.begin(), along.end(), 0.0);
     double below = 0, best = -1, cut = along.front();
-    for (std::size_t i = 1; i < along.size(); ++i) {
+    for (std::size_t i = 1; i + kFewestOfShift <= along.size(); ++i) {
       below += along[i - 1];
+      if (i < kFewestOfShift) continue;
       const auto low = static_cast<double>(i);
       const double apart = (all - below) / (n - low) - below / low;
       if (const double between = low * (n - low) * apart * apart; between > best) best = between, cut = along[i];
@@ -242,17 +364,18 @@ class ShiftFinder {
     return cut;
   }
 
-  // Keeps the division if it is the best so far and some group of it counts.
-  void consider(const std::optional<Division>& division) {
-    if (!division) return;
+  // Keeps the division if it is the best so far and some group of it counts, and returns whether it does.
+  bool consider(const std::optional<Division>& division) {
+    if (!division) return false;
     const auto fitted = fit(pairs_, *division);
-    if (!fitted || (best_ && fitted->mean.sum() >= fit_.mean.sum())) return;
+    if (!fitted || (best_ && fitted->mean.sum() >= fit_.mean.sum())) return false;
     for (std::size_t g = 1; g < fitted->offsets.size(); ++g)
       if (axes_of(*division, *fitted, g).any()) {
         best_ = division;
         fit_ = *fitted;
-        return;
+        return true;
       }
+    return false;
   }
   // The axes along which a group counts.
   Eigen::Array<bool, 3, 1> axes_of(const Division& division, const ShiftFit& fitted, std::size_t g) const {
@@ -261,7 +384,7 @@ class ShiftFinder {
     for (int k = 0; k < 3; ++k) {
       const double offset = std::abs(fitted.offsets[g][k]);
       axes[k] = offset > kOfStatedSigma * stated_[k] && offset > times * fitted.scatter[k] &&
-                fitted.mean[k] < kBetter * alone_.mean[k] && agrees(division, fitted, g, k);
+                fitted.mean[k] < kBetter * without_groups_[k] && agrees(division, fitted, g, k);
     }
     return axes;
   }
@@ -294,10 +417,11 @@ class ShiftFinder {
   }
 
   const Block& block_;
-  IndexedVector<FrameIndex, ImageIndex> image_of_;  // the first one of each frame
   std::vector<AntennaPair> pairs_;
   Eigen::Vector3d stated_ = Eigen::Vector3d::Zero();  // median sigmas
+  bool any_held_ = false;                             // the held ones give the datum
   ShiftFit alone_, fit_;
+  Eigen::Vector3d without_groups_ = Eigen::Vector3d::Zero();  // mean of |r| of one group that may be bent
   std::optional<Division> best_;
 };
 
@@ -310,14 +434,15 @@ PositionShifts find_position_shifts(const Block& block, const BlockState& state,
 
 std::string shift_text(const Block& block, const PositionShift& shift) {
   constexpr std::size_t kNamed = 5;
-  std::string text = fmt::format("{} ({}) lie {} the {} others: ", counted(std::ssize(shift.frames), "position"),
-                                 shift.kind, side_text(shift.offset), shift.others);
+  std::string text =
+      fmt::format("{} ({}) lie {} the {} of the largest group: ", counted(std::ssize(shift.frames), "position"),
+                  shift.kind, side_text(shift.offset), shift.others);
   for (std::size_t i = 0; i < std::min(kNamed, shift.frames.size()); ++i)
     text += (i > 0 ? ", " : "") + block.frames[shift.frames[i]].name;
   if (shift.frames.size() > kNamed) text += fmt::format(" and {} more", shift.frames.size() - kNamed);
   return text +
          "; flights or receivers with different datums? Their shift is an unknown of the adjustment ('orientation: "
-         "{shift_positions: false}' leaves them), and the others give the datum";
+         "{shift_positions: false}' leaves them), and the largest group gives the datum";
 }
 
 }  // namespace megablock

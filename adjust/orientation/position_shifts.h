@@ -16,10 +16,12 @@
 //     |o_g| > 3 sigma_p  and  |o_g| > k s,    k = 3 for folders, rigs and flights, 6 (1 + 6 / n) for the last two,
 //
 // with sigma_p the median of the stated sigmas and s = 1.4826 med |r| within the groups; and where the residuals along
-// this axis are half of those without groups or less (mean of |r|). Four positions and 80 % of the group must lie
-// within a quarter of the offset from it: three gross errors and a good position are no group. Sides and heaps are
-// chosen among many, so that k is larger for them: a single heap of normal errors that is cut in the middle has sides
-// 2.6 s apart. They are tried for up to 20 000 positions. Of all candidates that with the smallest residuals is taken.
+// this axis are half of those of one group that may be bent, or less (mean of |r|; the bend is a polynomial of the
+// second order). Four positions and 80 % of the group must lie within a quarter of the offset from it: three gross
+// errors and a good position are no group. Sides and heaps are chosen among many, so that k is larger for them: a single
+// heap of normal errors that is cut in the middle has sides 2.6 s apart. They are tried where no folder, rig or flight
+// counts, for up to 20 000 positions. Of all candidates that with the smallest residuals is taken. Where positions lie
+// on lines, nothing but the present attitude of the block tells the turn about them.
 //
 // The offset is the start of an unknown of the adjustment (io/block/observed_poses.h). Positions that follow the block
 // less well than the initial orientation is accurate, as two flights of a RTK receiver that lie decimetres apart, are
@@ -49,10 +51,11 @@ struct PositionShifts {
 };
 
 // The groups among `frames`, which hang together in `state` and have their datum from the positions. Frames whose
-// position is held, or belongs to a group already, take no part. Deterministic.
+// position belongs to a group already take no part. None where a position or attitude is held: it gives the datum.
+// Deterministic.
 PositionShifts find_position_shifts(const Block& block, const BlockState& state, const std::vector<FrameIndex>& frames);
 
-// "9 positions (images from DJI_0027.JPG on) lie 29.81 m above the 9 others: ...".
+// "9 positions (images from DJI_0027.JPG on) lie 29.81 m above the 9 of the largest group: ...".
 std::string shift_text(const Block& block, const PositionShift& shift);
 
 }  // namespace megablock

@@ -1,5 +1,6 @@
 #include "adjust/problem/half.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -150,7 +151,12 @@ void divide_priors(const HalfChoice& choice, TileProblem& problem) {
     for (int k = 0; k < term.value.size(); ++k)
       if (double& sigma = term.sigma[static_cast<std::size_t>(k)]; sigma > 0) draw.apply(term.value[k], sigma);
   }
+  // The prior of a shift is too loose to be an observation: its error would carry a tile hundreds of metres away.
+  const auto is_shift = [&](std::int32_t mount) {
+    return std::ranges::find(problem.positions, mount, &TileProblem::PositionTerm::group) != problem.positions.end();
+  };
   for (auto& term : problem.mount_priors) {
+    if (is_shift(term.mount)) continue;
     const MountId& id = problem.mounts[static_cast<std::size_t>(term.mount)];
     divide_pose(Draw(choice, Kind::kMount, {id.rig.value, id.mount}), term.value, term.rotation_sigma_rad,
                 term.position_sigma_m);

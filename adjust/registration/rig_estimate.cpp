@@ -224,7 +224,7 @@ bool has_free_rig(const Block& block) {
     for (int p = 0; p < camera.intrinsics.size(); ++p)
       if (camera.prior_sigma[static_cast<std::size_t>(p)] != 0) return true;
   for (const Rig& rig : block.rigs)
-    if (std::any_of(rig.mounts.begin(), rig.mounts.end(), [](const Mount& m) { return !m.held(); })) return true;
+    if (!rig.is_group() && std::ranges::any_of(rig.mounts, [](const Mount& m) { return !m.held(); })) return true;
   return false;
 }
 

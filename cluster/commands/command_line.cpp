@@ -322,9 +322,10 @@ void add_evaluate(CLI::App& app, Action& action, Communicator& ranks) {
           "Adjust the job again from two halves of its tie points, then of its images for the cameras, and print "
           "the differences over their sigmas")
       ->excludes(truth);
-  command->add_option("--divisions", options->test.divisions, "Divisions of the tie points for --halves")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  command
+      ->add_option("--divisions", options->test.divisions,
+                   "Divisions of the tie points for --halves; default: 16 for up to 50 images, else 4")
+      ->check(CLI::Range(1, 1000));
   command->add_option("--threads", options->run.threads, "Threads per rank for --halves; 0 = cores of the host / ranks")
       ->check(threads());
   EvaluateOptions& of_truth = options->evaluation;

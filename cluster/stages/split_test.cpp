@@ -65,17 +65,24 @@ BlockResult result_of(const std::string& job, Half half) {
   return read_result_without_tracks(store.verified_path(kResult));
 }
 
+std::int64_t divisions_for(const JobStore& job) {
+  constexpr std::int64_t kFewImages = 50, kOfFew = 16, kOfMany = 4;
+  const auto generations = JobJson::of_job(job).value("generations", std::vector<std::int64_t>());
+  return !generations.empty() && generations.back() <= kFewImages ? kOfFew : kOfMany;
+}
+
 }  // namespace
 
 void SplitTestOptions::check() const {
-  if (divisions < 1 || divisions > 1000) throw InputError("the number of divisions of a split test is 1 to 1000");
+  if (divisions < 0 || divisions > 1000) throw InputError("the number of divisions of a split test is 1 to 1000");
 }
 
 HalvesComparison run_split_test(const RunOptions& options, const SplitTestOptions& test, Communicator& ranks) {
   test.check();
   const std::string& job = options.directory;
+  const std::int64_t count = test.divisions > 0 ? test.divisions : divisions_for(JobStore(job));
   std::vector<HalvesComparison> divisions;  // on the first rank
-  for (std::int64_t division = 0; division < test.divisions; ++division) {
+  for (std::int64_t division = 0; division < count; ++division) {
     for (const Half half : {Half::kTiePoints1, Half::kTiePoints2}) adjust_half(options, {half, division}, ranks);
     on_first_rank(ranks, [&] {
       divisions.push_back(compare_halves(result_of(job, Half::kTiePoints1), result_of(job, Half::kTiePoints2)));

@@ -104,7 +104,9 @@ std::string position_groups_text(const BlockResult& result, std::span<const repo
   for (std::size_t i = 0; i < std::min(kNamedOfGroup, widest.upper.size()); ++i)
     text += (i > 0 ? ", " : "") + result.block.frames[widest.upper[i]].name;
   if (widest.upper.size() > kNamedOfGroup) text += fmt::format(" and {} more", widest.upper.size() - kNamedOfGroup);
-  return text + "; flights or receivers with different datums? correct the positions of one group, or leave them out";
+  return text +
+         "; flights or receivers with different datums? give one of them a shift with 'gps: {groups: [...]}', correct "
+         "its positions, or leave them out";
 }
 
 }  // namespace megablock

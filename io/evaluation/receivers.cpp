@@ -135,7 +135,9 @@ Eigen::Vector3d given_lever_arm(const BlockResult& result, RigIndex rig) {
 }
 
 std::string of_rig(const BlockResult& result, RigIndex rig) {
-  return result.block.rigs.size() == 1 ? "" : " of rig '" + result.block.rigs[rig].name + "'";
+  return std::ranges::count_if(result.block.rigs, [](const Rig& r) { return !r.is_group(); }) == 1
+             ? ""
+             : " of rig '" + result.block.rigs[rig].name + "'";
 }
 
 // The differences of the rigs, by rig. A value that was held has none.
@@ -194,14 +196,14 @@ std::vector<ShiftFigures> shifts_of(const BlockResult& result) {
     const Eigen::Vector3d variance = covariances[r].front().diagonal().tail<3>();
     ShiftFigures figures{r, axes.cwiseProduct(result.state.mounts[r].front().centre),
                          axes.cwiseProduct(Eigen::Vector3d(variance.cwiseMax(0).cwiseSqrt()))};
-    if (!figures.sigma.isZero(0)) shifts.push_back(figures);
+    if (!figures.sigma.isZero(0) && !figures.shift.isZero(0)) shifts.push_back(figures);
   }
   return shifts;
 }
 
 std::string shift_text(const BlockResult& result, const ShiftFigures& figures) {
-  return fmt::format("in the adjusted block the {} lie {} it (sigma {:.2g} m)", result.block.rigs[figures.group].name,
-                     side_text(figures.shift), figures.sigma.maxCoeff());
+  return fmt::format("in the adjusted block the {} lie {} their places (sigma {:.2g} m)",
+                     result.block.rigs[figures.group].name, side_text(figures.shift), figures.sigma.maxCoeff());
 }
 
 std::vector<std::string> receiver_remarks(const BlockResult& result, const report::Figures& figures) {

@@ -38,7 +38,7 @@ struct ShiftFigures {
   Eigen::Vector3d shift = Eigen::Vector3d::Zero(), sigma = Eigen::Vector3d::Zero();  // sigma: empirical where known
 };
 std::vector<ShiftFigures> shifts_of(const BlockResult& result);
-// "in the adjusted block the positions of a.jpg and 8 more lie 29.81 m above it (sigma 0.12 m)".
+// "in the adjusted block the positions of a.jpg and 8 more lie 29.81 m above their places (sigma 0.12 m)".
 std::string shift_text(const BlockResult& result, const ShiftFigures& figures);
 
 // One line for each rig whose antenna or attitudes are off by one vector of the rig, with the option that estimates it.

@@ -123,6 +123,14 @@ bool has_all_images_of(const Block& previous, const Block& now) {
   return true;
 }
 
+// Groups of positions are those of the project alone: the last rigs of a job are forgotten where they are groups that
+// it names no longer. Rigs after them would lose their numbers.
+void forget_last_groups(const Block& now, IndexedVector<RigIndex, Rig>& rigs) {
+  while (!rigs.empty() && rigs.back().is_group() &&
+         std::ranges::find(now.rigs, rigs.back().name, &Rig::name) == now.rigs.end())
+    rigs.pop_back();
+}
+
 Block append_to(const Block& previous, Block moved, const std::function<void()>& after_table) {
   if (previous.ground.georeferenced && moved.ground.georeferenced && !same_origin(previous.ground, moved.ground)) {
     move(GroundChange(moved.ground, previous.ground), moved);
@@ -138,7 +146,9 @@ Block append_to(const Block& previous, Block moved, const std::function<void()>&
   merged.image_folder = moved.image_folder;  // the folder may have been moved since the job began
   // From here each index of `now` goes through the table of its kind: cameras[old index] is the new one.
   const auto cameras = places_by_name(previous.cameras, moved.cameras, merged.cameras);
-  const auto rigs = places_by_name(previous.rigs, moved.rigs, merged.rigs);
+  IndexedVector<RigIndex, Rig> known = previous.rigs;
+  forget_last_groups(moved, known);
+  const auto rigs = places_by_name(known, moved.rigs, merged.rigs);
   const auto frames = places_by_name(previous.frames, moved.frames, merged.frames);
   const auto images = places_of_images(previous, moved, merged);
   for (std::size_t i = 0; i < cameras.size(); ++i)

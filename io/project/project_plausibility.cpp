@@ -26,7 +26,8 @@ void warn_of_distant_poses(Project& project) {
   std::vector<double> distances, sigmas;
   for (const Frame& frame : project.block.frames) {
     if (!frame.position_prior || !frame.given_pose) continue;
-    const Eigen::Array3d sigma = frame.position_prior->sigma.array();  // large for an unknown height
+    // Large for an unknown height or shift.
+    const Eigen::Array3d sigma = loosened(*frame.position_prior, project.block, frame.rig).sigma.array();
     const Eigen::Array3d off = difference(*frame.given_pose, *frame.position_prior).array();
     // A coordinate with a sigma of hundreds of metres says nothing; it does not count.
     distances.push_back((sigma < kFarOff_m).select(off, 0).matrix().norm());

@@ -89,6 +89,7 @@ GpsOptions read_gps_options(YamlReader& top, bool from_images) {
   options.lever_arm_sigma = read_receiver_sigma(*reader, "lever_arm_sigma_m", kSigmaMetres);
   options.groups = reader->texts("groups").value_or(std::vector<std::string>());
   if (const auto sigma = reader->number("group_sigma_m")) {
+    if (options.groups.empty()) refuse_unused(*reader, "group_sigma_m", "without 'groups', whose shifts it is for");
     check_within(*sigma, kSigmaMetres, "group_sigma_m", reader->where("group_sigma_m"));
     options.group_sigma = *sigma;
   }
@@ -123,7 +124,16 @@ void set_receivers(Block& block, const auto& has_prior, const auto& set) {
 }
 
 // Gives the positions of the images that match a pattern a shift in common. An image belongs to the first such pattern.
-void set_groups(const GpsOptions& options, const std::string& where, Block& block) {
+void set_groups(const GpsOptions& options, const std::string& where, Project& project) {
+  Block& block = project.block;
+  for (Frame& frame : block.frames)
+    if (auto& prior = frame.position_prior) {
+      prior->group = {};
+      if (held(*prior))
+        throw InputError(where +
+                         ": gps.groups: positions with a sigma of 0 are held, and cannot have a shift; give them a "
+                         "sigma, or remove 'groups'");
+    }
   for (const std::string& pattern : options.groups) {
     const RigIndex group = block.rigs.next_index();
     bool any = false;
@@ -141,6 +151,14 @@ void set_groups(const GpsOptions& options, const std::string& where, Block& bloc
           where, pattern));
     block.rigs.push_back(position_group("positions of " + pattern, Eigen::Vector3d::Zero(), options.group_sigma));
   }
+  if (std::ranges::none_of(block.frames, [](const Frame& frame) {
+        return frame.position_prior && !frame.position_prior->group.valid();
+      }))
+    project.warnings.push_back(fmt::format(
+        "{}: all positions belong to 'groups', which have a shift: without control points the place of the "
+        "block is known to 'group_sigma_m' ({:g} m) only; name the groups that may be wrong, and leave out the "
+        "one that gives the place",
+        where, options.group_sigma));
 }
 
 // The sigmas of a position: those of the project file, else the accuracy in the image header, else the defaults. A DOP
@@ -282,7 +300,7 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, b
   const auto set_unknowns = [&] {
     if (options.lever_arm_sigma > 0)
       set_receivers(block, has_position, [&](Mount& receiver) { receiver.position_sigma_m = options.lever_arm_sigma; });
-    if (!options.groups.empty()) set_groups(options, top.where("gps"), block);
+    if (options.use && !options.groups.empty()) set_groups(options, top.where("gps"), project);
   };
   if (!from_images) return set_unknowns();
   if (!known.empty() && !block.ground.georeferenced)

@@ -79,7 +79,8 @@ GlobalState start_global(const GlobalOptions& options) {
 
 GlobalState start_again(const GlobalState& before, const GlobalOptions& options) {
   GlobalState state = start_global(options);
-  state.lambda = state.sweep_lambda = std::min(state.lambda, before.lambda);
+  constexpr double kLeast = 1e-30;  // a rejection divides by it
+  state.lambda = state.sweep_lambda = std::clamp(before.lambda, kLeast, options.initial_lambda);
   state.accepted = before.accepted;
   state.held = before.held;
   return state;

@@ -119,7 +119,7 @@ class EverydayInput(CopyOfTheBlock):
                 self.assertIsNotNone(found, notes)
                 self.assertLess(abs(float(found[1]) - 47), 3 * float(found[2]))
                 self.assertLess(float(found[2]), 5)
-                found = re.search(rf"adjusted block the positions of .* lie {number} m above it \(sigma {number} m\)",
+                found = re.search(rf"adjusted block the positions of .* lie {number} m above their places \(sigma {number} m\)",
                                   notes)
                 self.assertIsNotNone(found, notes)
                 self.assertLess(abs(float(found[1]) - 47), 3 * float(found[2]) + 0.005)
@@ -152,8 +152,8 @@ class EverydayInput(CopyOfTheBlock):
                     self.assertGreater(errors["position_rms_m"], 0.3)
                     continue
                 notes = " ".join(state["notes"])
-                self.assertRegex(notes, "5 positions .* lie [45][0-9.]* m above the 7 others")
-                found = re.search(r"in the adjusted block the positions of \S+ and 4 more lie ([0-9.]+) m above it", notes)
+                self.assertRegex(notes, "5 positions .* lie [45][0-9.]* m above the 7 of the largest group")
+                found = re.search(r"in the adjusted block the positions of \S+ and 4 more lie ([0-9.]+) m above their places", notes)
                 self.assertLess(abs(float(found[1]) - 5), 0.2, notes)
                 self.assertLess(errors["position_rms_m"], 0.15)
 

@@ -88,7 +88,7 @@ class PositionGroups(unittest.TestCase):
                        env={**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"})
         self.assertEqual(*(megablock("status", block / job, "--digest") for job in ("job", "two")))
         notes = " ".join(json.loads(megablock("status", block / "job", "--json"))["notes"])
-        self.assertRegex(notes, r"positions of \S+ lie 1\.\d* m east of, 2\.\d* m south of and (29\.9|30\.0)\d m above it")
+        self.assertRegex(notes, r"positions of \S+ lie 1\.\d* m east of, 2\.\d* m south of and (29\.9|30\.0)\d m above their places")
         self.assertEqual((block / "job/result/report.html").read_text().count("shift [m]"), 2)
 
     def test_as_one_monolithic_adjustment(self):

@@ -94,8 +94,8 @@ void clear_scratch(const Job& job, bool use) {
 
 // Only the last round iterates to the end. The rounds before it only lead to decisions on observations and to sigmas. A
 // mean of a hundredth of a sigma of the frames' unknowns is enough for these: chi-square is then off by 1e-4 of their
-// number. A round between the first and the last starts near its end. Where two iterations do not get there, most positions
-// or control points are beyond the corners of their losses, and larger sigmas are what it needs.
+// number. A round between the first and the last starts near its end. Where two iterations do not get there, most
+// positions or control points are often beyond the corners of their losses, and larger sigmas are what they need.
 GlobalOptions options_of(const MergeSettings& settings, std::size_t frames, bool near, bool last) {
   constexpr double kSettled = 0.01;
   constexpr int kMostBetween = 2;
@@ -147,15 +147,14 @@ void begin_adjustment(MergePosition& position, const GlobalOptions& options) {
   position.global = start_again(position.global, options);
 }
 
-// Whether positions and control points are tested before the last round: where gross errors are sought, where a block
-// with scaled sigmas does not converge, from which a gross error may keep it for long, and where the sigmas have
-// settled with a control point far off, because the iterations to the end would be for nothing. The tests cost as much
-// as two iterations.
-bool asks_for_tests(const Job& job, const MergePosition& position, bool converged, bool scaled, bool rescaled,
-                    TileStore& tiles) {
+// Whether positions and control points are tested before the last round: where gross errors are sought; and where the
+// sigmas have settled, with a control point far off or without convergence. The iterations to the end would be for
+// nothing if there is a gross error, which may keep a block with scaled sigmas for long. The tests cost as much as two
+// iterations.
+bool asks_for_tests(const Job& job, const MergePosition& position, bool converged, bool rescaled, TileStore& tiles) {
   if (position.near == 0) return position.gross_errors == MergePosition::kSought;
-  if (position.gross_errors != MergePosition::kNotSought) return false;
-  return (!converged && scaled) || (!rescaled && control_seems_wrong(job, tiles));
+  if (position.gross_errors != MergePosition::kNotSought || rescaled) return false;
+  return (!converged && position.scales.matter()) || control_seems_wrong(job, tiles);
 }
 
 // Begins from afar again, because a gross error bends the block, until good observations seem wrong.
@@ -193,8 +192,8 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
   recorder.set_position([&] { return checkpoint.of_sweep(position); });
   std::int32_t saved = position.global.accepted;
   for (;;) {
-    const bool last = position.gross_errors != MergePosition::kSought &&
-                      position.round >= most_rounds(job.settings.merge, position);
+    const bool last =
+        position.gross_errors != MergePosition::kSought && position.round >= most_rounds(job.settings.merge, position);
     if (last) position.near = 1;
     const bool near = position.near != 0;
     const GlobalOptions options = options_of(job.settings.merge, frames, near, last);
@@ -231,10 +230,9 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
       say_costs(job, adjusted.costs);
       break;
     }
-    const bool scaled = position.scales.matter();
     const bool rescaled =
         near && job.settings.merge.scale_contradicted_sigmas && adopt_contradicted_scales(job, tiles, position.scales);
-    if (asks_for_tests(job, position, adjusted.converged, scaled, rescaled, tiles) &&
+    if (asks_for_tests(job, position, adjusted.converged, rescaled, tiles) &&
         judge_priors(job, test_priors(runner), tiles, position)) {
       begin_again(position, options);
       checkpoint.write(position, tiles, block);
@@ -277,11 +275,19 @@ std::string without_optimum(const GlobalState& state, double limit) {
 }
 
 // Why an existing result counts as a failed unit, in this run and in later ones that find it; empty: it does not.
-std::string shortfall(const Adjusted& adjusted, const MergeSettings& settings) {
+std::string shortfall(const Adjusted& adjusted, const std::vector<TilePart>& parts, const MergeSettings& settings) {
   if (!adjusted.converged) return without_optimum(adjusted.position.global, settings.decrement);
   if (std::ranges::none_of(adjusted.state.oriented, [](std::uint8_t oriented) { return oriented != 0; }))
     return "no image is oriented: too few observations hold in the adjustment; check start poses and cameras, and "
            "the limits for tie points under 'adjustment' in the project file";
+  const auto sum = [&](std::int64_t TilePart::*number) {
+    std::int64_t all = 0;
+    for (const TilePart& part : parts) all += part.*number;
+    return all;
+  };
+  if (sum(&TilePart::measured) > 0 && sum(&TilePart::kept) == 0)
+    return "no tie point observation holds in the adjustment, so that the poses are those of positions and attitudes "
+           "alone; check start poses, cameras and matches";
   return "";
 }
 
@@ -362,10 +368,10 @@ void run_merge(const Stage& stage, const Job& job, JobRecord& record, JobBlock& 
 
   MergeCheckpoint checkpoint(job, record.events, fingerprint);
   Adjusted adjusted = adjust_block(job, inputs, checkpoint);
-  const std::string reason = shortfall(adjusted, job.settings.merge);
   return_freed_memory();  // memory of fronts and tiles
   clear_scratch(job, false);
   const std::vector<TilePart> parts = gather_parts(job, adjusted, tracks.size());
+  const std::string reason = shortfall(adjusted, parts, job.settings.merge);
   UnitEvent event;
   event.stage = kMergeStage;
   event.unit = kResult;

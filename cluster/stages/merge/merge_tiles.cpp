@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <limits>
 #include <memory>
@@ -136,9 +137,13 @@ PriorLengths gather_lengths(const Job& job, TileStore& tiles) {
 }  // namespace
 
 bool control_seems_wrong(const Job& job, TileStore& tiles) {
-  constexpr double kFarOff = 3;  // sigmas
+  constexpr double kChance = 0.1;  // that one of n right points is so far off
   const PriorLengths lengths = gather_lengths(job, tiles);
-  return lengths.control_horizontal.any_above(kFarOff) || lengths.control_height.any_above(kFarOff);
+  const auto any = [&](const LengthCounts& counts) {
+    const auto n = static_cast<double>(std::max<std::int64_t>(1, counts.total()));
+    return counts.any_above(std::sqrt(2 * std::log(n / kChance)));  // P(|r| > x) = exp(-x^2 / 2) for two numbers
+  };
+  return any(lengths.control_horizontal) || any(lengths.control_height);
 }
 
 bool adopt_contradicted_scales(const Job& job, TileStore& tiles, SigmaScales& scales) {

@@ -156,7 +156,8 @@ BlockState grow(const BlockState& state, const Block& block) {
   std::copy(state.frames.begin(), state.frames.end(), grown.frames.begin());
   std::copy(state.oriented.begin(), state.oriented.end(), grown.oriented.begin());
   std::copy(state.cameras.begin(), state.cameras.end(), grown.cameras.begin());
-  for (RigIndex rig(0); state.mounts.contains(rig); ++rig.value)  // the rig may have got a receiver meanwhile
+  // A rig may have got a receiver meanwhile, and a group may have gone.
+  for (RigIndex rig(0); state.mounts.contains(rig) && grown.mounts.contains(rig); ++rig.value)
     if (state.mounts[rig].size() == grown.mounts[rig].size()) grown.mounts[rig] = state.mounts[rig];
   return grown;
 }

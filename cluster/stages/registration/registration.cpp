@@ -390,6 +390,11 @@ void RegistrationSettings::check() const {
 
 RegistrationSummary run_registration(const Job& job, JobRecord& record, Block& block, const TrackSource& source,
                                      const RegistrationSettings& settings) {
+  if (std::ranges::any_of(job.block.rigs, &Rig::is_group))
+    throw AgreedError<InputError>(
+        job.options.project +
+        ": gps.groups: the registration of drives takes positions as they are, without shifts; "
+        "correct the positions, or remove 'groups'");
   LazyTracks tracks(job.block, source);
   const std::string rig = run_rig(job, record, tracks, settings, block);
   const Trajectory trajectory = agreed_trajectory(job, settings.trajectory);

@@ -138,6 +138,27 @@ TEST(PositionOffset, AddsToTheShiftOfAGroup) {
   }
 }
 
+// The other positions of the group lie in another part of the block, which has not moved.
+TEST(PositionOffset, LeavesTheShiftOfAnotherPart) {
+  OffsetBlock block({0, 0, 46.9});
+  add_position_group(block.frames, {0, 0, 2}, {0, 0, 1}, block.block, block.state);
+  const RigIndex before = block.block.frames[FrameIndex(0)].position_prior->group;
+  PositionOffset offset;
+  offset.offset = {5, 0, 40};
+  shift_positions(offset, {block.frames.begin() + 20, block.frames.end()}, block.block, block.state);
+  for (const FrameIndex f : block.frames) {
+    const PositionPrior& prior = *block.block.frames[f].position_prior;
+    const Eigen::Vector3d expected = f.value < 20 ? Eigen::Vector3d(0, 0, 2) : Eigen::Vector3d(5, 0, 42);
+    EXPECT_EQ(prior.group == before, f.value < 20);
+    EXPECT_EQ(block.state.mounts[prior.group].front().centre, expected);
+    EXPECT_EQ(block.block.rigs[prior.group].mounts.front().pose.centre, expected);
+    EXPECT_EQ(prior.shifted.x(), f.value < 20 ? 0 : 1);
+  }
+  EXPECT_GT(block.block.rigs[block.block.frames[FrameIndex(39)].position_prior->group].mounts.front().position_sigma_m,
+            400);
+  EXPECT_NO_THROW(check(block.block));
+}
+
 TEST(PositionOffset, IsSaidInWords) {
   PositionOffset found;
   found.offset = {0, 0, 46.9};

@@ -73,8 +73,27 @@ TEST(PositionShifts, OfOneSideOfAStrip) {
     }
   EXPECT_THAT(shift_text(flight.block, shift),
               testing::MatchesRegex("8 positions [(]images from f12 on[)] lie [0-9.]+ m "
-                                    "above the 12 others: f12, f13, f14, f15, f16 and "
+                                    "above the 12 of the largest group: f12, f13, f14, f15, f16 and "
                                     "3 more; flights or receivers .*"));
+}
+
+// On a line nothing tells the turn about it, which must stay.
+TEST(PositionShifts, OfADriveDoNotTurnTheBlock) {
+  Flight drive(40, 0.05, 0.1);
+  for (std::int64_t i = 0; i < 40; ++i) {
+    const Eigen::Vector3d place(3.0 * static_cast<double>(i), 0.01 * static_cast<double>(i % 3), 2);
+    drive.prior(i).position += place - drive.state.frames[FrameIndex(i)].centre;
+    drive.state.frames[FrameIndex(i)].centre = place + Eigen::Vector3d(1, 2, 3);
+    if (i >= 25) drive.prior(i).position += Eigen::Vector3d(0, 4, 0);
+  }
+  const PositionShifts found = drive.find();
+  ASSERT_EQ(found.groups.size(), 1u);
+  EXPECT_NEAR(found.groups[0].offset.y(), 4, 0.2);
+  EXPECT_LT(found.to_others.rotation.angularDistance(Eigen::Quaterniond::Identity()), 0.005);
+  for (const FrameIndex f : {FrameIndex(0), FrameIndex(39)}) {
+    const Eigen::Vector3d& centre = drive.state.frames[f].centre;
+    EXPECT_LT((found.to_others(centre) - (centre - Eigen::Vector3d(1, 2, 3))).norm(), 0.15);
+  }
 }
 
 TEST(PositionShifts, OfFoldersRigsAndFlights) {
@@ -147,6 +166,36 @@ TEST(PositionShifts, AreNoErrorsOfOneDatum) {
   }
 }
 
+// Of two parallel lines each has a group of its own: a roll of the block explains as much as a shift, and nothing
+// contradicts it.
+TEST(PositionShifts, AreNoRollOfTwoLines) {
+  Flight lines(40, 0.05, 0.1);
+  for (std::int64_t i = 0; i < 40; ++i) {
+    const Eigen::Vector3d place(5.0 * static_cast<double>(i % 20), i < 20 ? 0 : 30, 50);
+    lines.prior(i).position += place - lines.state.frames[FrameIndex(i)].centre;
+    lines.state.frames[FrameIndex(i)].centre = place;
+    lines.block.frames[FrameIndex(i)].time_s = static_cast<double>(i < 20 ? i : 5000 + i);
+    if (i >= 20) lines.prior(i).position.z() += 3;
+  }
+  EXPECT_TRUE(lines.find().groups.empty());
+}
+
+// A corridor that sags, flown in parts one after another.
+TEST(PositionShifts, AreNoBend) {
+  for (const std::int64_t flights : {2, 4, 6, 10}) {
+    Flight sag(20 * flights, 0.02, 0.02);
+    const double length = static_cast<double>(20 * flights);
+    for (std::int64_t i = 0; i < 20 * flights; ++i) {
+      const double t = static_cast<double>(i) / length - 0.5;
+      const Eigen::Vector3d place(10 * static_cast<double>(i), 3.0 * static_cast<double>(i % 2), 100);
+      sag.prior(i).position += place - sag.state.frames[FrameIndex(i)].centre;
+      sag.state.frames[FrameIndex(i)].centre = place + Eigen::Vector3d(0, 0, 2 * t * t);
+      sag.block.frames[FrameIndex(i)].time_s = static_cast<double>(2 * i + 1000 * (i / 20));
+    }
+    EXPECT_TRUE(sag.find().groups.empty()) << flights;
+  }
+}
+
 TEST(PositionShifts, NeedFourPositionsThatMayMove) {
   Flight few(20), held(20), grouped(20);
   for (std::int64_t i = 17; i < 20; ++i) few.prior(i).position.z() += 30;
@@ -155,9 +204,10 @@ TEST(PositionShifts, NeedFourPositionsThatMayMove) {
   grouped.block.rigs = held.block.rigs;
   for (std::int64_t i = 12; i < 20; ++i) {
     for (Flight* flight : {&held, &grouped}) flight->prior(i).position.z() += 30;
-    held.prior(i).sigma.setConstant(1e-8);
     grouped.prior(i).group = RigIndex(1);
   }
+  EXPECT_FALSE(held.find().groups.empty());
+  held.prior(3).sigma.setConstant(1e-8);  // it gives the datum
   EXPECT_TRUE(held.find().groups.empty());
   EXPECT_TRUE(grouped.find().groups.empty());
   EXPECT_TRUE(Flight(7).find().groups.empty());

@@ -177,7 +177,7 @@ TEST(Receivers, ShiftsAreShownAlongTheirAxes) {
   EXPECT_EQ(shifts[0].shift, Eigen::Vector3d(0, 0, 46.9));
   EXPECT_LT((shifts[0].sigma - Eigen::Vector3d(0, 0, 0.02)).norm(), 1e-12);
   EXPECT_EQ(shift_text(result, shifts[0]),
-            "in the adjusted block the positions of a.jpg and 8 more lie 46.90 m above it (sigma 0.02 m)");
+            "in the adjusted block the positions of a.jpg and 8 more lie 46.90 m above their places (sigma 0.02 m)");
   EXPECT_THAT(receivers_of(result), IsEmpty());
 }
 
