@@ -147,14 +147,15 @@ void begin_adjustment(MergePosition& position, const GlobalOptions& options) {
   position.global = start_again(position.global, options);
 }
 
-// Whether positions and control points are tested before the last round: where gross errors are sought; and where the
-// sigmas have settled, with a control point far off or without convergence. The iterations to the end would be for
-// nothing if there is a gross error, which may keep a block with scaled sigmas for long. The tests cost as much as two
-// iterations.
-bool asks_for_tests(const Job& job, const MergePosition& position, bool converged, bool rescaled, TileStore& tiles) {
+// Whether positions and control points are tested before the last round: where gross errors are sought; where a block
+// with sigmas that were `scaled` in this round does not converge, from which a gross error may keep it for long; and
+// where the sigmas have settled with a control point far off, because the iterations to the end would be for nothing.
+// The tests cost as much as two iterations.
+bool asks_for_tests(const Job& job, const MergePosition& position, bool converged, bool scaled, bool rescaled,
+                    TileStore& tiles) {
   if (position.near == 0) return position.gross_errors == MergePosition::kSought;
-  if (position.gross_errors != MergePosition::kNotSought || rescaled) return false;
-  return (!converged && position.scales.matter()) || control_seems_wrong(job, tiles);
+  if (position.gross_errors != MergePosition::kNotSought) return false;
+  return (!converged && scaled) || (!rescaled && control_seems_wrong(job, tiles));
 }
 
 // Begins from afar again, because a gross error bends the block, until good observations seem wrong.
@@ -230,9 +231,10 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
       say_costs(job, adjusted.costs);
       break;
     }
+    const bool scaled = position.scales.matter();
     const bool rescaled =
         near && job.settings.merge.scale_contradicted_sigmas && adopt_contradicted_scales(job, tiles, position.scales);
-    if (asks_for_tests(job, position, adjusted.converged, rescaled, tiles) &&
+    if (asks_for_tests(job, position, adjusted.converged, scaled, rescaled, tiles) &&
         judge_priors(job, test_priors(runner), tiles, position)) {
       begin_again(position, options);
       checkpoint.write(position, tiles, block);
