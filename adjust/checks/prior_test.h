@@ -45,8 +45,8 @@ struct PriorTests {
 // Nothing is tested in directions in which nothing else determines the block.
 PriorTest test_prior(const Eigen::Vector3d& r, const Eigen::Matrix3d& covariance, double weight);
 
-// Tests the observations that the tile owns, without those that are held and positions with a shift. `frames` and `points` are the covariances of
-// the problem's tables at the solution, in a datum that is not free.
+// Tests the observations that the tile owns, but not those that are held, nor positions with a shift. `frames` and
+// `points` are the covariances of the problem's tables at the solution, in a datum that is not free.
 PriorTests test_priors(const TileProblem& problem, const TileState& state,
                        const std::vector<Eigen::Matrix<double, 6, 6>>& frames,
                        const std::vector<Eigen::Matrix3d>& points);

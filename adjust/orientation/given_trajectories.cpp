@@ -16,6 +16,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include "adjust/terms/linearise.h"
