@@ -23,6 +23,7 @@
 
 #include "adjust/terms/linearise.h"
 #include "adjust/terms/prior_loss.h"
+#include "adjust/terms/terms.h"
 #include "geometry/numbers/chi_square.h"
 #include "geometry/numbers/decompositions.h"
 
@@ -62,7 +63,9 @@ struct PriorsOfKind {
   bool far_off(const PriorTest& test) const {
     return static_cast<double>(all) * chance(test, all > kFew ? excess : least) < kChance;
   }
-  bool agrees(const PriorTest& test) const { return static_cast<double>(all) * chance(test, excess) >= kChance; }
+  bool agrees(const PriorTest& test) const {
+    return test.axes > 0 && static_cast<double>(all) * chance(test, excess) >= kChance;
+  }
 };
 
 PriorsOfKind kind_of(const LengthCounts& counts, std::int64_t aside, bool scaled) {
@@ -110,59 +113,62 @@ namespace {
 
 class PriorTester {
  public:
-  PriorTester(const TileProblem& problem, const TileState& state,
-              const std::vector<Eigen::Matrix<double, 6, 6>>& frames, const std::vector<Eigen::Matrix3d>& points)
-      : problem_(problem), state_(state), frames_(frames), points_(points) {}
+  PriorTester(const TileProblem& problem, const TileState& state, const PriorCovariances& covariances)
+      : problem_(problem), state_(state), covariances_(covariances) {}
 
   PriorTests run() {
-    for (const auto& term : problem_.positions)
-      if (tells(term)) add_test(id_of(term), test(term, loss_of(problem_, term)), tests_);
+    for (std::size_t i = 0; i < problem_.positions.size(); ++i) {
+      const TileProblem::PositionTerm& term = problem_.positions[i];
+      if (tells(term, covariances_.positions[i]))
+        add_test(id_of(term), test(term, covariances_.positions[i], loss_of(problem_, term)), tests_);
+    }
     for (const auto& term : problem_.point_priors)
       if (tells(term)) add_test(id_of(term), test(term, loss_of(problem_, term)), tests_);
-    for (const auto& term : problem_.positions_aside) add_aside(term);
-    for (const auto& term : problem_.point_priors_aside) add_aside(term);
+    for (std::size_t i = 0; i < problem_.positions_aside.size(); ++i) {
+      const TileProblem::PositionTerm& term = problem_.positions_aside[i];
+      const Eigen::Matrix3d& covariance = covariances_.positions_aside[i];
+      add_aside(id_of(term), tells(term, covariance) ? test(term, covariance, std::nullopt) : PriorTest());
+    }
+    for (const auto& term : problem_.point_priors_aside)
+      add_aside(id_of(term), tells(term) ? test(term, std::nullopt) : PriorTest());
     return std::move(tests_);
   }
 
  private:
-  PriorId id_of(const TileProblem::PositionTerm& term) const { return {problem_.frames[row(term)].value, 0}; }
+  PriorId id_of(const TileProblem::PositionTerm& term) const {
+    return {problem_.frames[static_cast<std::size_t>(term.frame.value)].value, 0};
+  }
   PriorId id_of(const TileProblem::PointTerm& term) const { return {problem_.points[row(term)].index, 1}; }
-  static std::size_t row(const TileProblem::PositionTerm& term) { return static_cast<std::size_t>(term.frame.value); }
   static std::size_t row(const TileProblem::PointTerm& term) { return static_cast<std::size_t>(term.point.value); }
 
-  // Whether the observation is uncertain and the block knows its place. The errors of a shift and of the frames of its
-  // group are nearly the same, and their covariance is not among `frames`: such positions are not tested.
-  bool tells(const TileProblem::PositionTerm& term) const {
-    return !held(term.prior) && term.group < 0 && !frames_[row(term)].isZero();
+  // Whether the observation is uncertain and the block knows its place.
+  static bool tells(const TileProblem::PositionTerm& term, const Eigen::Matrix3d& covariance) {
+    return !held(term.prior) && !covariance.isZero(0);
   }
   bool tells(const TileProblem::PointTerm& term) const { return !held(term) && problem_.active(term.point.value); }
 
   // `loss`: empty for an observation that takes no part.
-  PriorTest test(const TileProblem::PositionTerm& term, const std::optional<RobustLoss>& loss) const {
-    const FrameResidual3 r = linearise_position(state_.frames[row(term)], prior_of(term, state_));
-    return test(r.residual, r.by_frame * frames_[row(term)] * r.by_frame.transpose(), loss);
+  PriorTest test(const TileProblem::PositionTerm& term, const Eigen::Matrix3d& covariance,
+                 const std::optional<RobustLoss>& loss) const {
+    return test(linearise_position(term, state_).residual, covariance, loss);
   }
   PriorTest test(const TileProblem::PointTerm& term, const std::optional<RobustLoss>& loss) const {
     const Eigen::Vector3d inverse = term.sigma.cwiseInverse();
     return test(point_prior_residual(state_.points[row(term)], term),
-                inverse.asDiagonal() * points_[row(term)] * inverse.asDiagonal(), loss);
+                inverse.asDiagonal() * covariances_.points[row(term)] * inverse.asDiagonal(), loss);
   }
   static PriorTest test(const Eigen::Vector3d& r, const Eigen::Matrix3d& covariance,
                         const std::optional<RobustLoss>& loss) {
     return test_prior(r, covariance, loss ? loss->evaluate(r.squaredNorm())[1] : 0);
   }
-  template <typename Term>
-  void add_aside(const Term& term) {
-    PriorTest result;
-    if (tells(term)) result = test(term, std::nullopt);
-    result.prior = id_of(term);
-    tests_.aside.push_back(result);
+  void add_aside(const PriorId& id, PriorTest test) {
+    test.prior = id;
+    tests_.aside.push_back(test);
   }
 
   const TileProblem& problem_;
   const TileState& state_;
-  const std::vector<Eigen::Matrix<double, 6, 6>>& frames_;
-  const std::vector<Eigen::Matrix3d>& points_;
+  const PriorCovariances& covariances_;
   PriorTests tests_;
 };
 
@@ -200,10 +206,8 @@ void move_priors(const std::vector<PriorId>& priors, TileProblem& problem, bool 
 
 }  // namespace
 
-PriorTests test_priors(const TileProblem& problem, const TileState& state,
-                       const std::vector<Eigen::Matrix<double, 6, 6>>& frames,
-                       const std::vector<Eigen::Matrix3d>& points) {
-  return PriorTester(problem, state, frames, points).run();
+PriorTests test_priors(const TileProblem& problem, const TileState& state, const PriorCovariances& covariances) {
+  return PriorTester(problem, state, covariances).run();
 }
 
 PriorVerdicts change_verdicts(const PriorTests& tests, const PriorVerdicts& now, std::array<bool, 2> scaled) {

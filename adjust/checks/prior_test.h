@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "adjust/problem/tile_problem.h"
@@ -45,11 +46,13 @@ struct PriorTests {
 // Nothing is tested in directions in which nothing else determines the block.
 PriorTest test_prior(const Eigen::Vector3d& r, const Eigen::Matrix3d& covariance, double weight);
 
-// Tests the observations that the tile owns, but not those that are held, nor positions with a shift. `frames` and
-// `points` are the covariances of the problem's tables at the solution, in a datum that is not free.
-PriorTests test_priors(const TileProblem& problem, const TileState& state,
-                       const std::vector<Eigen::Matrix<double, 6, 6>>& frames,
-                       const std::vector<Eigen::Matrix3d>& points);
+// Covariances of the rows of a problem's tables at the solution, in a datum that is not free. Zero: unknown.
+struct PriorCovariances {
+  std::span<const Eigen::Matrix3d> positions, positions_aside;  // of the residuals, in sigmas squared
+  std::span<const Eigen::Matrix3d> points;                      // metres squared
+};
+// Tests the observations that the tile owns, but not those that are held.
+PriorTests test_priors(const TileProblem& problem, const TileState& state, const PriorCovariances& covariances);
 
 // What was decided on observations that seemed wrong.
 struct PriorVerdicts {
@@ -61,9 +64,9 @@ struct PriorVerdicts {
 //
 // An observation is set aside that contradicts the rest of the block and pulls it; of several only those near the
 // worst, and few at a time, because a gross error makes its neighbours look wrong too. An observation that is set
-// aside comes back where it agrees with the block that was adjusted without it. At most a fifth of a kind is set
-// aside, and none of fewer than five. `scaled`: positions, control points, whose sigmas are multiplied by factors from
-// their own residuals, and less well known.
+// aside comes back where it agrees with the block that was adjusted without it; one that cannot be tested stays aside.
+// At most a fifth of a kind is set aside, and none of fewer than five. `scaled`: positions, control points, whose
+// sigmas are multiplied by factors from their own residuals, and less well known.
 PriorVerdicts change_verdicts(const PriorTests& tests, const PriorVerdicts& now, std::array<bool, 2> scaled);
 
 // Takes these observations out of the problem, or back into it. A control point without its coordinates is a check

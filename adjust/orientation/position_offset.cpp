@@ -113,8 +113,6 @@ std::optional<PositionOffset> find_position_offset(const Block& block, const Blo
 
 namespace {
 
-using ShiftAxes = Eigen::Matrix<std::uint8_t, 3, 1>;
-
 // A group may have positions in another part of the block, which keep their shift: those of `frames` then become a
 // group of their own.
 void shift_group(const PositionOffset& offset, const std::vector<FrameIndex>& frames, const ShiftAxes& axes,
@@ -158,8 +156,8 @@ void shift_positions(const PositionOffset& offset, const std::vector<FrameIndex>
       add_position_group(members, offset.offset, axes, block, state);
 }
 
-void add_position_group(const std::vector<FrameIndex>& frames, const Eigen::Vector3d& offset,
-                        const Eigen::Matrix<std::uint8_t, 3, 1>& axes, Block& block, BlockState& state) {
+void add_position_group(const std::vector<FrameIndex>& frames, const Eigen::Vector3d& offset, const ShiftAxes& axes,
+                        Block& block, BlockState& state) {
   const RigIndex group = block.rigs.next_index();
   for (const FrameIndex frame : frames) {
     PositionPrior& prior = *block.frames[frame].position_prior;

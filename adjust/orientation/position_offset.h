@@ -47,8 +47,8 @@ void shift_positions(const PositionOffset& offset, const std::vector<FrameIndex>
                      BlockState& state);
 
 // Adds a group of positions to the block: those of `frames`, which lie `offset` off the state along `axes` that are 1.
-void add_position_group(const std::vector<FrameIndex>& frames, const Eigen::Vector3d& offset,
-                        const Eigen::Matrix<std::uint8_t, 3, 1>& axes, Block& block, BlockState& state);
+void add_position_group(const std::vector<FrameIndex>& frames, const Eigen::Vector3d& offset, const ShiftAxes& axes,
+                        Block& block, BlockState& state);
 
 // "the positions lie 46.90 m above the control points (sigma 0.02 m, 6 points): ...".
 std::string offset_text(const PositionOffset& offset);

@@ -10,7 +10,7 @@
 #include <numeric>
 #include <optional>
 
-#include "geometry/numbers/decompositions.h"
+#include "adjust/orientation/shift_fit.h"
 #include "geometry/numbers/median.h"
 #include "io/block/held_priors.h"
 #include "io/text/counted.h"
@@ -27,177 +27,6 @@ constexpr double kOfStatedSigma = 3, kOfSpread = 3, kOfChosen = 6, kOfFew = 6;
 constexpr double kBetter = 0.5;                   // share of the residuals without groups
 constexpr double kNear = 0.25, kNearlyAll = 0.8;  // of the offset; share of a group
 constexpr double kGap_s = 600;                    // between two flights
-constexpr double kMadToSigma = 1.4826;
-constexpr int kReweightings = 20;
-
-struct AntennaPair {
-  FrameIndex frame;
-  Eigen::Vector3d in_block, observed;  // antenna
-  Eigen::Vector3d sigma;               // stated
-};
-
-// A division of the pairs into groups. Group 0 is the largest, and -1 takes no part.
-struct Division {
-  std::vector<int> group;          // [pairs]
-  std::vector<std::string> names;  // [groups]
-  bool chosen = false;             // among many
-};
-
-struct ShiftFit {
-  Similarity similarity;                                                              // to the datum of group 0
-  std::vector<Eigen::Vector3d> offsets;                                               // [groups] o_g
-  std::vector<Eigen::Vector3d> residuals;                                             // [pairs] p - s R x - t - o_g
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero(), scatter = Eigen::Vector3d::Zero();  // of |r|; s
-};
-
-// The similarity and the offsets of a division.
-class ShiftFitter {
- public:
-  ShiftFitter(const std::vector<AntennaPair>& pairs, const Division& division)
-      : division_(division), weights_(pairs.size(), 1) {
-    std::vector<double> sigmas;
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      sigmas.push_back(pairs[i].sigma.minCoeff());
-      if (division.group[i] >= 0) used_.push_back({i, static_cast<std::size_t>(division.group[i]), &pairs[i]});
-    }
-    least_m_ = 0.1 * median(std::move(sigmas));
-    fitted_.residuals.assign(pairs.size(), Eigen::Vector3d::Zero());
-  }
-
-  std::optional<ShiftFit> run() {
-    for (int iteration = 0; iteration < kReweightings; ++iteration)
-      if (!solve()) return std::nullopt;
-    measure();
-    return std::move(fitted_);
-  }
-
- private:
-  struct Used {
-    std::size_t row, group;
-    const AntennaPair* pair;
-  };
-
-  void find_centroids() {
-    const std::size_t groups = division_.names.size();
-    in_block_.assign(groups, Eigen::Vector3d::Zero());
-    observed_ = in_block_;
-    std::vector<double> sum(groups, 0);
-    for (const Used& used : used_) {
-      sum[used.group] += weights_[used.row];
-      in_block_[used.group] += weights_[used.row] * used.pair->in_block;
-      observed_[used.group] += weights_[used.row] * used.pair->observed;
-    }
-    for (std::size_t g = 0; g < groups; ++g) in_block_[g] /= sum[g], observed_[g] /= sum[g];
-  }
-
-  // One solution with the present weights, and the weights of the next one.
-  bool solve() {
-    find_centroids();
-    std::vector<Eigen::Vector3d> from, to;
-    std::vector<double> weights;
-    for (const Used& used : used_) {
-      from.push_back(used.pair->in_block - in_block_[used.group]);
-      to.push_back(used.pair->observed - observed_[used.group]);
-      weights.push_back(weights_[used.row]);
-    }
-    keep_attitude(from, to, weights);
-    auto turn = fit_similarity(from, to, weights);
-    if (!turn) return false;
-    turn->translation.setZero();
-    std::vector<double> lengths;
-    for (std::size_t i = 0; i < used_.size(); ++i) {
-      const Eigen::Vector3d residual = to[i] - (*turn)(from[i]);
-      fitted_.residuals[used_[i].row] = residual;
-      lengths.push_back(residual.norm());
-      weights_[used_[i].row] = 1 / std::max(lengths.back(), least_m_);
-    }
-    usual_m_ = median(std::move(lengths));
-    fitted_.offsets.clear();
-    for (std::size_t g = 0; g < observed_.size(); ++g)
-      fitted_.offsets.push_back((observed_[g] - observed_[0]) - (*turn)(in_block_[g] - in_block_[0]));
-    turn->translation = observed_[0] - (*turn)(in_block_[0]);
-    fitted_.similarity = *turn;
-    return true;
-  }
-
-  // Positions on a line do not tell the turn about it, and their errors would. Six further pairs say that the block
-  // keeps its attitude, with the information that the errors feign.
-  void keep_attitude(std::vector<Eigen::Vector3d>& from, std::vector<Eigen::Vector3d>& to,
-                     std::vector<double>& weights) const {
-    constexpr double kLeast = 1e-6;  // of the length
-    double all = 0, squares = 0;
-    for (std::size_t i = 0; i < from.size(); ++i) {
-      all += weights[i];
-      squares += weights[i] * from[i].squaredNorm();
-    }
-    const double length = std::sqrt(squares / all);
-    const double weight = all * std::pow(std::max(usual_m_ / length, kLeast), 2) / 4;
-    for (int axis = 0; axis < 3; ++axis)
-      for (const double end : {-length, length}) {
-        from.emplace_back(end * Eigen::Vector3d::Unit(axis));
-        to.push_back(from.back());
-        weights.push_back(weight);
-      }
-  }
-
-  void measure() {
-    for (int k = 0; k < 3; ++k) {
-      std::vector<double> lengths;
-      for (const Used& used : used_) lengths.push_back(std::abs(fitted_.residuals[used.row][k]));
-      fitted_.mean[k] = std::accumulate(lengths.begin(), lengths.end(), 0.0) / static_cast<double>(lengths.size());
-      fitted_.scatter[k] = kMadToSigma * median(std::move(lengths));
-    }
-  }
-
-  const Division& division_;
-  std::vector<Used> used_;                            // pairs of a group
-  std::vector<double> weights_;                       // [pairs]
-  double least_m_ = 0;                                // of a residual, for its weight
-  double usual_m_ = 0;                                // median length of the residuals
-  std::vector<Eigen::Vector3d> in_block_, observed_;  // [groups] centroids
-  ShiftFit fitted_;
-};
-
-std::optional<ShiftFit> fit(const std::vector<AntennaPair>& pairs, const Division& division) {
-  return ShiftFitter(pairs, division).run();
-}
-
-// Polynomials of the second order in the two directions in which the block extends most, [pairs x terms].
-Eigen::MatrixXd bends(const std::vector<AntennaPair>& pairs) {
-  constexpr std::size_t kFewestForBend = 12;  // positions
-  const auto n = static_cast<Eigen::Index>(pairs.size());
-  Eigen::MatrixX3d places(n, 3);
-  for (Eigen::Index i = 0; i < n; ++i) places.row(i) = pairs[static_cast<std::size_t>(i)].in_block.transpose();
-  places.rowwise() -= places.colwise().mean().eval();
-  const SymmetricEigen3 spread = symmetric_eigen3(places.transpose() * places / static_cast<double>(n));
-  std::array<int, 3> axes{0, 1, 2};
-  std::ranges::sort(axes, std::ranges::greater(), [&](int axis) { return spread.values[axis]; });
-  places /= std::sqrt(std::max(spread.values[axes[0]], 1e-12));
-  const Eigen::ArrayXd u = places * spread.vectors.col(axes[0]), v = places * spread.vectors.col(axes[1]);
-  Eigen::MatrixXd all(n, 6);
-  all << Eigen::ArrayXd::Ones(n), u, v, u * u, u * v, v * v;
-  return pairs.size() < kFewestForBend ? Eigen::MatrixXd(all.leftCols(1)) : all;
-}
-
-// The mean length of the residuals along each axis that a bend of the block leaves, with weights as those of the fit.
-Eigen::Vector3d mean_beside_bend(const std::vector<AntennaPair>& pairs, const std::vector<Eigen::Vector3d>& residuals) {
-  constexpr double kRidge = 1e-9, kLeast = 1e-6;
-  const Eigen::MatrixXd basis = bends(pairs);
-  const auto n = static_cast<Eigen::Index>(pairs.size());
-  Eigen::Vector3d means;
-  for (int k = 0; k < 3; ++k) {
-    Eigen::VectorXd along(n), weights = Eigen::VectorXd::Ones(n), left;
-    for (Eigen::Index i = 0; i < n; ++i) along[i] = residuals[static_cast<std::size_t>(i)][k];
-    for (int iteration = 0; iteration < kReweightings; ++iteration) {
-      Eigen::MatrixXd normal = basis.transpose() * weights.asDiagonal() * basis;
-      normal.diagonal().array() += kRidge * normal.trace();
-      left = along - basis * solve_symmetric(normal, basis.transpose() * weights.asDiagonal() * along);
-      weights = left.cwiseAbs().cwiseMax(kLeast).cwiseInverse();
-    }
-    means[k] = left.cwiseAbs().mean();
-  }
-  return means;
-}
 
 // Numbers the groups by their size. Positions of small groups take no part. Empty where one group is left.
 std::optional<Division> division_by(const std::vector<std::string>& names, bool chosen) {
@@ -243,7 +72,7 @@ class ShiftFinder {
     Division all;
     all.group.assign(pairs_.size(), 0);
     all.names = {""};
-    const auto alone = fit(pairs_, all);
+    const auto alone = fit_shifts(pairs_, all);
     if (!alone) return {};
     alone_ = *alone;
     without_groups_ = alone_.mean.cwiseMin(mean_beside_bend(pairs_, alone_.residuals));
@@ -341,7 +170,7 @@ class ShiftFinder {
         for (const double r : along)
           names.emplace_back(r < cut ? "residuals on one side" : "residuals on the other side");
         const auto division = division_by(names, true);
-        const auto fitted = division ? fit(pairs_, *division) : std::nullopt;
+        const auto fitted = division ? fit_shifts(pairs_, *division) : std::nullopt;
         if (!fitted) break;
         consider(division);
         for (std::size_t i = 0; i < along.size(); ++i)
@@ -367,7 +196,7 @@ class ShiftFinder {
   // Keeps the division if it is the best so far and some group of it counts, and returns whether it does.
   bool consider(const std::optional<Division>& division) {
     if (!division) return false;
-    const auto fitted = fit(pairs_, *division);
+    const auto fitted = fit_shifts(pairs_, *division);
     if (!fitted || (best_ && fitted->mean.sum() >= fit_.mean.sum())) return false;
     for (std::size_t g = 1; g < fitted->offsets.size(); ++g)
       if (axes_of(*division, *fitted, g).any()) {

@@ -18,10 +18,10 @@
 // with sigma_p the median of the stated sigmas and s = 1.4826 med |r| within the groups; and where the residuals along
 // this axis are half of those of one group that may be bent, or less (mean of |r|; the bend is a polynomial of the
 // second order). Four positions and 80 % of the group must lie within a quarter of the offset from it: three gross
-// errors and a good position are no group. Sides and heaps are chosen among many, so that k is larger for them: a single
-// heap of normal errors that is cut in the middle has sides 2.6 s apart. They are tried where no folder, rig or flight
-// counts, for up to 20 000 positions. Of all candidates that with the smallest residuals is taken. Where positions lie
-// on lines, nothing but the present attitude of the block tells the turn about them.
+// errors and a good position are no group. Sides and heaps are chosen among many, so that k is larger for them: a
+// single heap of normal errors that is cut in the middle has sides 2.6 s apart. They are tried where no folder, rig or
+// flight counts, for up to 20 000 positions. Of all candidates that with the smallest residuals is taken. Where
+// positions lie on lines, nothing but the present attitude of the block tells the turn about them.
 //
 // The offset is the start of an unknown of the adjustment (io/block/observed_poses.h). Positions that follow the block
 // less well than the initial orientation is accurate, as two flights of a RTK receiver that lie decimetres apart, are
@@ -38,11 +38,11 @@
 namespace megablock {
 
 struct PositionShift {
-  std::vector<FrameIndex> frames;                      // of the group, ascending
-  std::string kind;                                    // what they have in common: "folder 'b'", "flight 2", ...
-  Eigen::Vector3d offset = Eigen::Vector3d::Zero();    // from the positions of the largest group, metres
-  Eigen::Matrix<std::uint8_t, 3, 1> shifted{0, 0, 0};  // 1: the offset counts along this axis
-  std::size_t others = 0;                              // positions of the largest group
+  std::vector<FrameIndex> frames;                    // of the group, ascending
+  std::string kind;                                  // what they have in common: "folder 'b'", "flight 2", ...
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // from the positions of the largest group, metres
+  ShiftAxes shifted{0, 0, 0};                        // 1: the offset counts along this axis
+  std::size_t others = 0;                            // positions of the largest group
 };
 
 struct PositionShifts {

@@ -28,6 +28,26 @@ PositionPrior prior_of(const TileProblem::PositionTerm& term, const TileState& s
   return term.receiver < 0 ? prior : corrected(prior, state.mounts[static_cast<std::size_t>(term.receiver)]);
 }
 
+LinearTerm linearise_position(const TileProblem::PositionTerm& term, const TileState& state) {
+  using enum ObservationKind;
+  const Pose& frame = state.frames[static_cast<std::size_t>(term.frame.value)];
+  const FrameResidual3 r = linearise_position(frame, prior_of(term, state));
+  LinearTerm out;
+  out.set_residual(r.residual);
+  out.kinds = {kPositionHorizontal, kPositionHorizontal, kPositionHeight};
+  out.add_block(LinearTerm::By::kFrame, term.frame.value, r.by_frame);
+  const Eigen::Vector3d weight = term.prior.sigma.cwiseInverse();
+  const auto add_mount = [&](std::int32_t mount, const Eigen::Matrix3d& by_centre) {
+    if (mount < 0) return;
+    Eigen::Matrix<double, 3, 6> by_mount = Eigen::Matrix<double, 3, 6>::Zero();
+    by_mount.rightCols<3>() = weight.asDiagonal() * by_centre;
+    out.add_block(LinearTerm::By::kMount, mount, by_mount);
+  };
+  add_mount(term.receiver, frame.rotation.conjugate().toRotationMatrix());
+  add_mount(term.group, term.prior.shifted.cast<double>().asDiagonal());
+  return out;
+}
+
 namespace {
 
 class Positions final : public ObservationType {
@@ -42,23 +62,8 @@ class Positions final : public ObservationType {
   }
   void linearise(const TileProblem& problem, const TileState& state, std::size_t row,
                  const TermVisit& visit) const override {
-    const TileProblem::PositionTerm& term = problem.positions[row];
-    const Pose& frame = state.frames[term.frame.value];
-    const FrameResidual3 r = linearise_position(frame, prior_of(term, state));
-    LinearTerm out;
-    out.set_residual(r.residual);
-    out.kinds = {kPositionHorizontal, kPositionHorizontal, kPositionHeight};
-    out.add_block(LinearTerm::By::kFrame, term.frame.value, r.by_frame);
-    const Eigen::Vector3d weight = term.prior.sigma.cwiseInverse();
-    const auto add_mount = [&](std::int32_t mount, const Eigen::Matrix3d& by_centre) {
-      if (mount < 0) return;
-      Eigen::Matrix<double, 3, 6> by_mount = Eigen::Matrix<double, 3, 6>::Zero();
-      by_mount.rightCols<3>() = weight.asDiagonal() * by_centre;
-      out.add_block(LinearTerm::By::kMount, mount, by_mount);
-    };
-    add_mount(term.receiver, frame.rotation.conjugate().toRotationMatrix());
-    add_mount(term.group, term.prior.shifted.cast<double>().asDiagonal());
-    out.loss = loss_of(problem, term);
+    LinearTerm out = linearise_position(problem.positions[row], state);
+    out.loss = loss_of(problem, problem.positions[row]);
     visit(out);
   }
   TermDatum datum(const TileProblem& problem, const TileState& state, std::size_t row) const override {
@@ -77,11 +82,12 @@ class Positions final : public ObservationType {
   void scale_sigmas(TileProblem& problem, const SigmaScales& scales) const override {
     // GNSS heights are worse than horizontal positions, and their errors have other causes. They have a factor of their
     // own.
-    const double horizontal = scales[kPositionHorizontal];
     for (auto* terms : {&problem.positions, &problem.positions_aside})
-      for (TileProblem::PositionTerm& term : *terms)
-        if (!held(term.prior))
-          term.prior.sigma.array() *= Eigen::Array3d(horizontal, horizontal, scales[kPositionHeight]);
+      for (TileProblem::PositionTerm& term : *terms) {
+        if (held(term.prior)) continue;
+        const PositionScale scale = scales.of_positions(term.prior.group);
+        term.prior.sigma.array() *= Eigen::Array3d(scale.horizontal, scale.horizontal, scale.height);
+      }
   }
   ceres::CostFunction* automatic(const TileProblem& problem, std::size_t row) const override {
     const TileProblem::PositionTerm& term = problem.positions[row];

@@ -53,10 +53,44 @@ std::span<const ObservationType* const> observation_types_of_cost() {
   return types;
 }
 
-bool SigmaScales::matter() const {
-  // A factor within 2 % changes a weight by 4 % at most.
-  constexpr double kSettled = 0.02;
-  return std::any_of(of.begin(), of.end(), [](double scale) { return std::abs(scale - 1) > kSettled; });
+PositionScale SigmaScales::of_positions(RigIndex group) const {
+  for (const PositionScale& scale : of_groups())
+    if (scale.group == group) return scale;
+  return {group, (*this)[ObservationKind::kPositionHorizontal], (*this)[ObservationKind::kPositionHeight]};
+}
+
+bool SigmaScales::has_place_for(RigIndex group) const {
+  const auto is = [group](const PositionScale& scale) { return scale.group == group; };
+  return group_count < std::ssize(groups) || std::any_of(groups.begin(), groups.begin() + group_count, is);
+}
+
+void SigmaScales::set_positions(const PositionScale& scale) {
+  const auto end = groups.begin() + group_count;
+  const auto place = std::lower_bound(groups.begin(), end, scale.group,
+                                      [](const PositionScale& s, RigIndex group) { return s.group < group; });
+  if (place != end && place->group == scale.group) {
+    *place = scale;
+  } else if (end != groups.end()) {
+    std::move_backward(place, end, end + 1);
+    *place = scale;
+    ++group_count;
+  }
+}
+
+void SigmaScales::multiply(const SigmaScales& change) {
+  // Before the factors of the kind change, which hold for a group that has none of its own yet.
+  for (const PositionScale& by : change.of_groups()) {
+    const PositionScale now = of_positions(by.group);
+    set_positions({by.group, now.horizontal * by.horizontal, now.height * by.height});
+  }
+  for (std::size_t k = 0; k < kObservationKinds; ++k) of[k] *= change.of[k];
+}
+
+bool SigmaScales::differ_by(double factor) const {
+  const auto differs = [factor](double scale) { return scale > factor || scale < 1 / factor; };
+  const auto group_differs = [&](const PositionScale& s) { return differs(s.horizontal) || differs(s.height); };
+  return std::any_of(of.begin(), of.end(), differs) ||
+         std::any_of(groups.begin(), groups.begin() + group_count, group_differs);
 }
 
 }  // namespace megablock

@@ -26,6 +26,7 @@
 
 #include "adjust/problem/tile_problem.h"
 #include "io/block/observation_statistics.h"
+#include "io/block/observed_poses.h"
 
 namespace ceres {
 class CostFunction;
@@ -39,7 +40,7 @@ struct TermUnknowns {
   int frame_count = 0;
   std::array<std::int32_t, 2> mounts{-1, -1};  // -1: none
   std::int32_t camera = -1;                    // -1: none
-  std::int64_t point = -1;               // the tile or cell that owns the point owns the row
+  std::int64_t point = -1;                     // the tile or cell that owns the point owns the row
 };
 
 // A linearised row, or a part of it that has a loss of its own. Everything is divided by sigma; no loss is applied.
@@ -75,6 +76,10 @@ struct LinearTerm {
 };
 using TermVisit = std::function<void(const LinearTerm&)>;
 
+// The residual of an observed position, with the derivatives by the frame, the receiver and the shift of its group
+// (position_terms.cpp). Without a loss.
+LinearTerm linearise_position(const TileProblem::PositionTerm& term, const TileState& state);
+
 // The information of a row about the place, direction and scale of the part of the block that holds `frame`.
 struct TermDatum {
   std::int32_t frame = -1;  // -1: none
@@ -89,14 +94,28 @@ struct TermDatum {
   double base_sigma_m = 0;
 };
 
-// A factor for the sigmas of each kind of observation.
+// A factor for the sigmas of each kind of observation. Groups of positions (io/block/observed_poses.h) may have factors
+// of their own in place of those of the kind.
 struct SigmaScales {
+  static constexpr std::size_t kMostGroups = 32;
   std::array<double, kObservationKinds> of;
+  std::int64_t group_count = 0;
+  std::array<PositionScale, kMostGroups> groups{};  // the first group_count, ascending
   SigmaScales() { of.fill(1); }
   double& operator[](ObservationKind kind) { return of[static_cast<std::size_t>(kind)]; }
   double operator[](ObservationKind kind) const { return of[static_cast<std::size_t>(kind)]; }
-  // Whether a factor differs from 1 by more than 2 %.
-  bool matter() const;
+  std::span<const PositionScale> of_groups() const { return {groups.data(), static_cast<std::size_t>(group_count)}; }
+  // The factors of the positions of a group, or of those without one.
+  PositionScale of_positions(RigIndex group) const;
+  // Whether a group has factors of its own, or may get them.
+  bool has_place_for(RigIndex group) const;
+  // Gives a group factors of its own, if there is place for it.
+  void set_positions(const PositionScale& scale);
+  // Multiplies by the factors of `change`. It has all groups that these factors have.
+  void multiply(const SigmaScales& change);
+  // Whether a factor, or its inverse, is larger than this one.
+  bool differ_by(double factor) const;
+  bool matter() const { return differ_by(1.02); }  // a smaller factor changes a weight by 4 % at most
 };
 
 class ObservationType {

@@ -16,6 +16,8 @@ constexpr double kFirstBin = -5;  // log2 of the start of the first bin
 constexpr double kMedianOfTwo = 1.1774, kMedianOfOne = 0.6745;
 constexpr double kFarTooSmall = 3;            // factor
 constexpr std::int64_t kFewestResiduals = 4;  // residuals of a kind: fewer have no median that stands an outlier
+// Of a group: the median of four residuals, from which the group takes its shift, may be a tenth of what it should be.
+constexpr std::int64_t kFewestOfGroup = 8;
 
 void add_residual(const Eigen::Vector3d& residual, const Eigen::Vector3d& sigma, LengthCounts& horizontal,
                   LengthCounts& height) {
@@ -52,7 +54,17 @@ bool LengthCounts::any_above(double length) const {
                      [](std::int64_t count) { return count > 0; });
 }
 
+PriorLengths::OfGroup& PriorLengths::of(RigIndex group) {
+  const auto place = std::ranges::lower_bound(groups, group, {}, &OfGroup::group);
+  return place != groups.end() && place->group == group ? *place : *groups.insert(place, OfGroup{group, {}, {}});
+}
+
 void PriorLengths::add(const PriorLengths& other) {
+  for (const OfGroup& lengths : other.groups) {
+    OfGroup& sum = of(lengths.group);
+    sum.horizontal.add(lengths.horizontal);
+    sum.height.add(lengths.height);
+  }
   position_horizontal.add(other.position_horizontal);
   position_height.add(other.position_height);
   control_horizontal.add(other.control_horizontal);
@@ -64,8 +76,13 @@ PriorLengths prior_lengths(const TileProblem& problem, const TileState& state) {
   for (const auto& term : problem.positions) {
     if (held(term.prior)) continue;
     const Pose& frame = state.frames[static_cast<std::size_t>(term.frame.value)];
-    add_residual(linearise_position(frame, prior_of(term, state)).residual, term.prior.sigma,
-                 lengths.position_horizontal, lengths.position_height);
+    const Eigen::Vector3d residual = linearise_position(frame, prior_of(term, state)).residual;
+    if (!term.prior.group.valid()) {
+      add_residual(residual, term.prior.sigma, lengths.position_horizontal, lengths.position_height);
+    } else {
+      PriorLengths::OfGroup& group = lengths.of(term.prior.group);
+      add_residual(residual, term.prior.sigma, group.horizontal, group.height);
+    }
   }
   for (const auto& term : problem.point_priors) {
     if (held(term) || !problem.active(term.point.value)) continue;
@@ -75,19 +92,53 @@ PriorLengths prior_lengths(const TileProblem& problem, const TileState& state) {
   return lengths;
 }
 
+namespace {
+
+// The change of a factor that is `now`, by the median of the residuals. `usual`: this median for residuals of one sigma
+// with a redundancy of one.
+double change_of(double now, const LengthCounts& counts, double usual, double redundancy) {
+  if (counts.total() < kFewestResiduals) return 1;
+  const double all = now * counts.median() / (usual * std::sqrt(redundancy));
+  return (all < kFarTooSmall ? 1 : all) / now;
+}
+
+bool has_a_median(const PriorLengths::OfGroup& group) {
+  return std::max(group.horizontal.total(), group.height.total()) >= kFewestOfGroup;
+}
+
+}  // namespace
+
 SigmaScales contradicted_sigma_scales(const SigmaScales& now, const PriorLengths& lengths) {
   using enum ObservationKind;
-  const std::int64_t numbers = 2 * (lengths.position_horizontal.total() + lengths.control_horizontal.total()) +
-                               lengths.position_height.total() + lengths.control_height.total();
+  LengthCounts horizontal = lengths.position_horizontal, height = lengths.position_height;
+  std::int64_t numbers =
+      2 * (horizontal.total() + lengths.control_horizontal.total()) + height.total() + lengths.control_height.total();
+  for (const PriorLengths::OfGroup& group : lengths.groups)
+    numbers += 2 * group.horizontal.total() + group.height.total();
   const double redundancy = std::max(0.5, 1 - 7 / static_cast<double>(std::max<std::int64_t>(1, numbers)));
   SigmaScales change;
+  for (const PositionScale& group : now.of_groups()) change.set_positions({group.group});
+  for (const PriorLengths::OfGroup& group : lengths.groups) {
+    if (!has_a_median(group)) continue;
+    if (!change.has_place_for(group.group)) {
+      horizontal.add(group.horizontal);
+      height.add(group.height);
+      continue;
+    }
+    const PositionScale of_group = now.of_positions(group.group);
+    const auto part = [&](double factor, const LengthCounts& counts, double usual) {
+      if (counts.total() < kFewestOfGroup) return 1.0;
+      const double of_shift = 1 / static_cast<double>(counts.total());
+      return change_of(factor, counts, usual, std::max(0.5, redundancy - of_shift));
+    };
+    change.set_positions({group.group, part(of_group.horizontal, group.horizontal, kMedianOfTwo),
+                          part(of_group.height, group.height, kMedianOfOne)});
+  }
   const auto judge = [&](ObservationKind kind, const LengthCounts& counts, double usual) {
-    if (counts.total() < kFewestResiduals) return;
-    const double all = now[kind] * counts.median() / (usual * std::sqrt(redundancy));
-    change[kind] = (all < kFarTooSmall ? 1 : all) / now[kind];
+    change[kind] = change_of(now[kind], counts, usual, redundancy);
   };
-  judge(kPositionHorizontal, lengths.position_horizontal, kMedianOfTwo);
-  judge(kPositionHeight, lengths.position_height, kMedianOfOne);
+  judge(kPositionHorizontal, horizontal, kMedianOfTwo);
+  judge(kPositionHeight, height, kMedianOfOne);
   judge(kControlHorizontal, lengths.control_horizontal, kMedianOfTwo);
   judge(kControlHeight, lengths.control_height, kMedianOfOne);
   return change;

@@ -10,15 +10,17 @@
 //     factor = med |r| / (m sqrt(q)),   m = 1.1774 for two numbers, 0.6745 for one,   q = 1 - 7 / n
 //
 // with |r| the horizontal or vertical part of a residual in sigmas, and q the redundancy of the n numbers that place
-// the block, of which a similarity takes seven (at least a half is left). The median does not notice gross errors. In
-// the first solution it would: there an outlier at the edge of a block bends it, until good points are off as well. A
-// factor below three is left to the loss, which such sigmas do not mislead: of three-dimensional residuals a quarter is
-// then beyond twice the corner. From three on the sigmas of this kind are multiplied by the factor, and the result says
-// so.
+// the block, of which a similarity takes seven (at least a half is left). Each group of positions with a shift is a
+// kind of its own, whose shift takes one number of each axis: q - 1 / n_g with n_g positions. The median does not
+// notice gross errors. In the first solution it would: there an outlier at the edge of a block bends it, until good
+// points are off as well. A factor below three is left to the loss, which such sigmas do not mislead: of
+// three-dimensional residuals a quarter is then beyond twice the corner. From three on the sigmas of this kind are
+// multiplied by the factor, and the result says so.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "adjust/terms/terms.h"
 
@@ -42,7 +44,13 @@ class LengthCounts {
 
 // The residuals of positions and control points in sigmas, without those that are held.
 struct PriorLengths {
+  struct OfGroup {
+    RigIndex group;
+    LengthCounts horizontal, height;
+  };
   LengthCounts position_horizontal, position_height, control_horizontal, control_height;
+  std::vector<OfGroup> groups;  // ascending; the positions above belong to none
+  OfGroup& of(RigIndex group);
   void add(const PriorLengths& other);
 };
 // Those that the tile owns.
@@ -50,6 +58,9 @@ PriorLengths prior_lengths(const TileProblem& problem, const TileState& state);
 
 // The factors by which the sigmas of positions and control points must be multiplied; the block was adjusted with `now`
 // times the stated sigmas. The product of all factors is one, or three and more. Other kinds have the factor 1.
+// Groups have factors of their own, as long as SigmaScales has place for them; those beyond count as positions without
+// a group. A group with too few residuals for a median has the factors of positions without a group, and no say in
+// them, because its shift takes up most of its residuals.
 SigmaScales contradicted_sigma_scales(const SigmaScales& now, const PriorLengths& lengths);
 
 // Sets the losses of positions and control points: those of the options, from afar or as they are.

@@ -20,6 +20,7 @@ ResultTile tile_of_result(const BlockResult& result, const ObservationOptions& o
   set_image_sigma(problem, result.image_sigma_px);
   SigmaScales scales;
   for (std::size_t k = 0; k < kObservationKinds; ++k) scales.of[k] = result.observation_table.kinds[k].scale;
+  for (const PositionScale& scale : result.position_scales) scales.set_positions(scale);
   scale_sigmas(problem, scales);
   std::vector<PriorId> aside;
   for (const FrameIndex frame : result.positions_aside) aside.push_back({frame.value, 0});

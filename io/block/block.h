@@ -69,14 +69,17 @@ struct Rig {
   std::span<const Mount> cameras() const { return {mounts.data(), mounts.size() - (has_receiver() ? 1 : 0)}; }
 };
 
+// East, north, up. 1: the positions of a group are shifted along this axis.
+using ShiftAxes = Eigen::Matrix<std::uint8_t, 3, 1>;
+
 // Position of the GNSS antenna in the ground frame.
 struct PositionPrior {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // metres
   Eigen::Vector3d sigma = Eigen::Vector3d(3, 3, 6);    // metres; east, north, up
   // Position of the antenna in the rig, metres: antenna = C + R' lever_arm.
   Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();
-  RigIndex group{};                                    // whose shift the position has; invalid: none
-  Eigen::Matrix<std::uint8_t, 3, 1> shifted{0, 0, 0};  // 1 for each axis along which the group is shifted
+  RigIndex group{};  // whose shift the position has; invalid: none
+  ShiftAxes shifted{0, 0, 0};
 };
 
 // Attitude observed in the ground frame. Where it was observed relative to the vertical at the frame's own place, it

@@ -24,6 +24,12 @@
 
 namespace megablock {
 
+// By how much the sigmas of a group's positions were multiplied, from their residuals.
+struct PositionScale {
+  RigIndex group{};
+  double horizontal = 1, height = 1;
+};
+
 inline PositionPrior corrected(PositionPrior prior, const Pose& receiver) {
   prior.lever_arm += receiver.centre;
   return prior;

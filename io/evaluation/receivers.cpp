@@ -13,6 +13,7 @@
 #include "geometry/transform/rotation.h"
 #include "io/block/held_priors.h"
 #include "io/block/observed_poses.h"
+#include "io/evaluation/used_sigmas.h"
 #include "io/text/side_text.h"
 
 namespace megablock {
@@ -194,16 +195,29 @@ std::vector<ShiftFigures> shifts_of(const BlockResult& result) {
     if (member == result.block.frames.end()) continue;
     const Eigen::Vector3d axes = member->position_prior->shifted.cast<double>();
     const Eigen::Vector3d variance = covariances[r].front().diagonal().tail<3>();
-    ShiftFigures figures{r, axes.cwiseProduct(result.state.mounts[r].front().centre),
-                         axes.cwiseProduct(Eigen::Vector3d(variance.cwiseMax(0).cwiseSqrt()))};
+    ShiftFigures figures;
+    figures.group = r;
+    figures.shift = axes.cwiseProduct(result.state.mounts[r].front().centre);
+    figures.sigma = axes.cwiseProduct(Eigen::Vector3d(variance.cwiseMax(0).cwiseSqrt()));
+    figures.scale = position_scale(result, r);
+    const auto& own = result.position_scales;
+    figures.own_scale = std::ranges::find(own, r, &PositionScale::group) != own.end();
     if (!figures.sigma.isZero(0) && !figures.shift.isZero(0)) shifts.push_back(figures);
   }
   return shifts;
 }
 
 std::string shift_text(const BlockResult& result, const ShiftFigures& figures) {
-  return fmt::format("in the adjusted block the {} lie {} their places (sigma {:.2g} m)",
-                     result.block.rigs[figures.group].name, side_text(figures.shift), figures.sigma.maxCoeff());
+  std::string text =
+      fmt::format("in the adjusted block the {} lie {} their places (sigma {:.2g} m)",
+                  result.block.rigs[figures.group].name, side_text(figures.shift), figures.sigma.maxCoeff());
+  const auto [group, horizontal, height] = figures.scale;
+  if (figures.own_scale && (horizontal > 1 || height > 1))
+    text += fmt::format(
+        ", and scatter more than their sigmas predict: the adjustment used these times {:.1f} (horizontal) and {:.1f} "
+        "(height); 'merge: {{scale_contradicted_sigmas: false}}' keeps the stated ones",
+        horizontal, height);
+  return text;
 }
 
 std::vector<std::string> receiver_remarks(const BlockResult& result, const report::Figures& figures) {

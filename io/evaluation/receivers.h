@@ -36,9 +36,12 @@ std::vector<ReceiverFigures> receivers_of(const BlockResult& result);
 struct ShiftFigures {
   RigIndex group;
   Eigen::Vector3d shift = Eigen::Vector3d::Zero(), sigma = Eigen::Vector3d::Zero();  // sigma: empirical where known
+  PositionScale scale;     // sigmas of its positions, used over stated
+  bool own_scale = false;  // not that of all positions
 };
 std::vector<ShiftFigures> shifts_of(const BlockResult& result);
-// "in the adjusted block the positions of a.jpg and 8 more lie 29.81 m above their places (sigma 0.12 m)".
+// "in the adjusted block the positions of a.jpg and 8 more lie 29.81 m above their places (sigma 0.12 m)", and by how
+// much their own sigmas were multiplied.
 std::string shift_text(const BlockResult& result, const ShiftFigures& figures);
 
 // One line for each rig whose antenna or attitudes are off by one vector of the rig, with the option that estimates it.

@@ -6,20 +6,25 @@
 
 namespace megablock {
 
-inline Eigen::Vector3d scaled_sigma(const BlockResult& result, const Eigen::Vector3d& sigma, ObservationKind horizontal,
-                                    ObservationKind height) {
-  const double across = result.observation_table[horizontal].scale, up = result.observation_table[height].scale;
-  return sigma.cwiseProduct(Eigen::Vector3d(across, across, up));
-}
-
 // East, north, up; metres. The control of a survey has one quality, so that check points have the factors of the
 // control points.
 inline Eigen::Vector3d used_sigma(const BlockResult& result, const ControlPoint& point) {
-  return scaled_sigma(result, point.sigma, ObservationKind::kControlHorizontal, ObservationKind::kControlHeight);
+  const double across = result.observation_table[ObservationKind::kControlHorizontal].scale;
+  const double up = result.observation_table[ObservationKind::kControlHeight].scale;
+  return point.sigma.cwiseProduct(Eigen::Vector3d(across, across, up));
+}
+
+// A group of positions may have factors of its own. An invalid group: positions without one.
+inline PositionScale position_scale(const BlockResult& result, RigIndex group) {
+  for (const PositionScale& scale : result.position_scales)
+    if (scale.group == group) return scale;
+  return {group, result.observation_table[ObservationKind::kPositionHorizontal].scale,
+          result.observation_table[ObservationKind::kPositionHeight].scale};
 }
 
 inline Eigen::Vector3d used_sigma(const BlockResult& result, const PositionPrior& prior) {
-  return scaled_sigma(result, prior.sigma, ObservationKind::kPositionHorizontal, ObservationKind::kPositionHeight);
+  const PositionScale scale = position_scale(result, prior.group);
+  return prior.sigma.cwiseProduct(Eigen::Vector3d(scale.horizontal, scale.horizontal, scale.height));
 }
 
 }  // namespace megablock

@@ -113,7 +113,9 @@ OrderedJson position_groups(const BlockResult& result) {
   for (const ShiftFigures& group : shifts_of(result))
     list.push_back({{"group", result.block.rigs[group.group].name},
                     {"shift_m", vector(group.shift)},
-                    {"sigma_shift_m", vector(group.sigma)}});
+                    {"sigma_shift_m", vector(group.sigma)},
+                    {"sigma_scale_horizontal", number(group.scale.horizontal)},
+                    {"sigma_scale_height", number(group.scale.height)}});
   return list;
 }
 

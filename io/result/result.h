@@ -15,6 +15,7 @@
 #include "io/block/block.h"
 #include "io/block/image_graph.h"
 #include "io/block/observation_statistics.h"
+#include "io/block/observed_poses.h"
 #include "io/block/tracks.h"
 
 namespace megablock {
@@ -145,9 +146,10 @@ struct BlockResult : TrackResults {
   double variance_factor = 1;  // a posteriori; = chi2_per_dof
   double chi2 = 0;
   std::int64_t degrees_of_freedom = 0;
-  double image_sigma_px = 0;           // of a tie point observation per axis, as used in the adjustment
-  ObservationTable observation_table;  // by kind: count, weighted squares, redundancy; empty: unknown
-  bool sigma_scaled = false;           // true: covariances are multiplied by variance_factor
+  double image_sigma_px = 0;                   // of a tie point observation per axis, as used in the adjustment
+  ObservationTable observation_table;          // by kind: count, weighted squares, redundancy; empty: unknown
+  std::vector<PositionScale> position_scales;  // of groups that have factors of their own, ascending
+  bool sigma_scaled = false;                   // true: covariances are multiplied by variance_factor
   int global_iterations = 0;
   double newton_decrement = 0;
   double decrement_limit = 0;  // the adjustment has converged if the decrement is not above it; 0: unknown

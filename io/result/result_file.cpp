@@ -271,6 +271,28 @@ void get_free_parts(const Hdf5Reader& file, BlockResult& result) {
   }
 }
 
+void put_position_scales(Hdf5Writer& file, const BlockResult& result) {
+  const std::vector<PositionScale>& scales = result.position_scales;
+  if (scales.empty()) return;
+  file.group("position_scales", "sigma of the adjustment over the stated one, of groups of positions");
+  file.vector("position_scales/group", column(scales, [](const PositionScale& s) { return s.group.value; }),
+              {"", "rows of rigs"});
+  file.vector("position_scales/horizontal", column(scales, [](const PositionScale& s) { return s.horizontal; }));
+  file.vector("position_scales/height", column(scales, [](const PositionScale& s) { return s.height; }));
+}
+
+void get_position_scales(const Hdf5Reader& file, BlockResult& result) {
+  if (!file.has("position_scales")) return;
+  const auto group = file.vector<std::int64_t>("position_scales/group");
+  const auto horizontal = file.vector<double>("position_scales/horizontal", rows(group));
+  const auto height = file.vector<double>("position_scales/height", rows(group));
+  for (std::size_t row = 0; row < group.size(); ++row) {
+    if (!result.block.rigs.contains(RigIndex(group[row])))
+      file.fail("position_scales/group", "names a rig that is not there");
+    result.position_scales.push_back({RigIndex(group[row]), horizontal[row], height[row]});
+  }
+}
+
 void put_set_aside(Hdf5Writer& file, const BlockResult& result) {
   file.group("set_aside", "observations that contradict the rest of the block and take no part");
   file.vector("set_aside/position", column(result.positions_aside, [](FrameIndex f) { return f.value; }),
@@ -310,6 +332,7 @@ void put_head(Hdf5Writer& file, const BlockResult& result) {
 void put_tail(Hdf5Writer& file, const BlockResult& result) {
   put_control_results(file, result);
   put_set_aside(file, result);
+  put_position_scales(file, result);
   put_free_parts(file, result.free_parts);
   put_observation_table(file, result.observation_table);
   put_seams(file, result.seams);
@@ -339,6 +362,7 @@ BlockResult get_head_and_tail(const Hdf5Reader& file) {
     result.empirical.control = square_matrices<Eigen::Matrix3d>(
         file.array<double>("control/empirical_covariance", {rows(result.block.control_points), 3, 3}));
   get_set_aside(file, result);
+  get_position_scales(file, result);
   get_free_parts(file, result);
   get_observation_table(file, result.observation_table);
   result.seams = get_seams(file);

@@ -227,6 +227,15 @@ class CellPlanner {
         if (mount >= 0) touch(cell, plan_.unknown_of_mount[at(mount)]);
       if (term.camera >= 0) touch(cell, plan_.unknown_of_camera[at(term.camera)]);
     });
+    // A position that is set aside is still tested, for which its unknowns must meet in a front
+    // (merge/tile/position_covariances.h).
+    for (const TileProblem::PositionTerm& term : problem_.positions_aside) {
+      frames.assign(1, term.frame.value);
+      const std::size_t cell = owner_of(frames);
+      touch(cell, plan_.unknown_of_frame[at(term.frame.value)]);
+      for (const std::int32_t mount : {term.receiver, term.group})
+        if (mount >= 0) touch(cell, plan_.unknown_of_mount[at(mount)]);
+    }
   }
 
   const TileProblem& problem_;

@@ -147,6 +147,9 @@ struct TileCovariance {
   std::vector<Eigen::Matrix<double, 6, 6>> aligned_frames;
   std::vector<Eigen::MatrixXd> cameras;  // [cameras] covariance of the model's parameters; zero for held ones
   std::vector<Eigen::Matrix<double, 6, 6>> mounts;  // [mounts]
+  // [positions], [positions_aside] of the problem: their residuals, in sigmas squared (position_covariances.h); zero
+  // where nothing is known
+  std::vector<Eigen::Matrix3d> positions, positions_aside;
   // [points]; zero for points that take no part, and for tie points where TileDatum::clusters are given
   std::vector<Eigen::Matrix3d> points;
   ObservationTable observations;  // statistics of all observations of the tile, of those points

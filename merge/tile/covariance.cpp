@@ -25,6 +25,7 @@
 #include "merge/tile/cluster_scores.h"
 #include "merge/tile/condense.h"
 #include "merge/tile/point_equations.h"
+#include "merge/tile/position_covariances.h"
 
 namespace megablock {
 
@@ -227,6 +228,7 @@ class TileCovarianceBuilder {
       : plan_(plan),
         factor_(factor),
         offsets_(row_offsets(plan.unknowns)),
+        positions_(problem, plan, state, result_),
         tables_(problem, plan, state),
         cells_([&, this] {
           return std::make_unique<CellCovariances>(problem, plan, state, tables_, columns, offsets_, datum, result_);
@@ -277,8 +279,9 @@ class TileCovarianceBuilder {
       if (unknown_of_row[row] >= 0) row_of_unknown[at(unknown_of_row[row])] = static_cast<std::int64_t>(row);
   }
 
-  // Copies the diagonal blocks of the listed unknowns.
+  // Copies the diagonal blocks of the listed unknowns, and takes the positions that depend on them.
   void take(const CovarianceMatrix& covariance, const UnknownList& list) {
+    positions_.take(covariance, list);
     for (const Unknown& u : list) {
       const std::int64_t unknown = find_unknown(plan_.unknowns, u.id);
       if (unknown < 0) continue;
@@ -312,9 +315,10 @@ class TileCovarianceBuilder {
   const TileFactor& factor_;
   std::vector<std::int64_t> offsets_;
   std::vector<std::int64_t> frame_of_, camera_of_, mount_of_;
+  TileCovariance result_;
+  PositionCovariances positions_;
   PointTables tables_;
   PerThread<CellCovariances> cells_;
-  TileCovariance result_;
 };
 
 }  // namespace

@@ -178,6 +178,8 @@ void write_start(const Start& start, const BlockResult& result, std::uint64_t se
   Json sigmas{{"image_sigma_px", result.image_sigma_px}};
   for (std::size_t k = 0; k < kObservationKinds; ++k)
     sigmas["scales"].push_back(result.observation_table.kinds[k].scale);
+  for (const PositionScale& scale : result.position_scales)
+    sigmas["groups"].push_back({scale.group.value, scale.horizontal, scale.height});
   std::ofstream(start.file("sigmas.json")) << sigmas;
 }
 
@@ -192,6 +194,9 @@ struct Inputs {
     const Json sigmas = Json::parse(in);
     image_sigma_px = sigmas["image_sigma_px"];
     for (std::size_t k = 0; k < kObservationKinds; ++k) scales.of[k] = sigmas["scales"][k];
+    if (sigmas.contains("groups"))
+      for (const Json& group : sigmas["groups"])
+        scales.set_positions({RigIndex(group[0].get<std::int64_t>()), group[1], group[2]});
   }
   RankTile tile(const Tiles& partition, TileIndex number, const TrackSet& tracks,
                 std::vector<Eigen::Vector3d> points) const {

@@ -81,7 +81,11 @@ class PositionGroups(unittest.TestCase):
 
     def test_said_and_the_same_on_two_ranks(self):
         block = self.grouped("ranks", "--frames", 60)
+        with h5py.File(block / "given.h5", "r+") as given:  # the group has factors of its own
+            given["frames/position_prior/position"][20:30] += numpy.random.default_rng(1).normal(0, 0.5, (10, 3))
         self.run_job(block)
+        with h5py.File(block / "job/result/block.h5") as result:
+            self.assertGreater(result["position_scales/height"][1], 3)
         subprocess.run(["mpirun", "--bind-to", "none", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", "-n",
                         "2", MEGABLOCK, "run", block / "block.yaml", "-j", block / "two", "-q"], check=True,
                        stdout=subprocess.DEVNULL,
@@ -101,6 +105,43 @@ class PositionGroups(unittest.TestCase):
         self.assertGreaterEqual(figures["tiles"], 4)
         self.assertEqual(figures["free_datum"], 0)
         self.assertLess(figures["max_pose_difference_sigmas"], 1e-6)
+
+    def test_a_gross_error_within_a_group(self):
+        """It is set aside, and changes nothing else by more than one sigma."""
+        right, wrong = self.grouped("without_error", "--frames", 40), self.grouped("with_error", "--frames", 40)
+        with h5py.File(wrong / "given.h5", "r+") as given:
+            given["frames/position_prior/position"][14] += (0.3, 0, -0.5)
+        for block in (right, wrong):
+            self.run_job(block)
+        with h5py.File(right / "job/result/block.h5") as before, h5py.File(wrong / "job/result/block.h5") as after:
+            self.assertEqual(list(before["set_aside/position"]), [])
+            self.assertEqual(list(after["set_aside/position"]), [14])
+            moved = after["frames/centre"][:] - before["frames/centre"][:]
+            sigmas = numpy.sqrt(numpy.diagonal(before["frames/covariance"][:, 3:, 3:], axis1=1, axis2=2))
+            print("moved by sigmas:", abs(moved / sigmas).max())
+            self.assertLess(abs(moved / sigmas).max(), 1)
+        remarks = " ".join(json.loads(megablock("status", wrong / "job", "--json"))["remarks"])
+        self.assertRegex(remarks, r"1 of 40 positions differs from the block by more than 6 sigmas: f000014.jpg by 0\.\d+ m")
+
+    def test_a_group_with_worse_positions(self):
+        """Ten positions of 0.5 m that are stated with 0.03 m have factors of their own; the rest of the block has none."""
+        position, factors = [], []
+        for seed in range(1, 9):
+            block = self.grouped(f"worse{seed}", "--frames", 40, "--seed", seed)
+            with h5py.File(block / "given.h5", "r+") as given:
+                given["frames/position_prior/position"][10:20] += numpy.random.default_rng(seed).normal(0, 0.5, (10, 3))
+            position.append(self.run_job(block)["normalised_error_position"])
+            with h5py.File(block / "job/result/block.h5") as result:
+                scales = result["position_scales"]
+                factors.append([scales["horizontal"][0], scales["height"][0]])
+                self.assertEqual([scales["horizontal"][1], scales["height"][1]], [1, 1])
+                self.assertTrue((result["statistics/scale"][:] == 1).all())
+            notes = " ".join(json.loads(megablock("status", block / "job", "--json"))["notes"])
+            self.assertIn("scatter more than their sigmas predict", notes)
+        print("factors:", numpy.median(factors, axis=0), "poses:", numpy.mean(position))
+        for factor in numpy.median(factors, axis=0):
+            self.assertLess(abs(numpy.log2(factor / (0.5 / 0.03))), 0.6)
+        self.assertLess(abs(numpy.mean(position) - 1), 0.2)
 
     def test_without_groups_the_block_is_worse(self):
         wrong, _ = simulate("wrong", "--frames", 40)

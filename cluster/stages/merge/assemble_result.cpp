@@ -111,6 +111,7 @@ BlockResult assemble_result(const Job& job, const JobRecord& record, Block& bloc
   result.gauge = outcome.gauge;
   result.seams = outcome.seams;
   result.observation_table = outcome.observations;
+  result.position_scales = std::move(outcome.position_scales);
   result.notes = record.notes;
   list_failures(record, not_oriented, result);
   return result;

@@ -151,11 +151,17 @@ void begin_adjustment(MergePosition& position, const GlobalOptions& options) {
 // with sigmas that were `scaled` in this round does not converge, from which a gross error may keep it for long; and
 // where the sigmas have settled with a control point far off, because the iterations to the end would be for nothing.
 // The tests cost as much as two iterations.
-bool asks_for_tests(const Job& job, const MergePosition& position, bool converged, bool scaled, bool rescaled,
-                    TileStore& tiles) {
+bool asks_for_tests(const MergePosition& position, bool converged, bool scaled, bool rescaled,
+                    const PriorLengths& lengths) {
   if (position.near == 0) return position.gross_errors == MergePosition::kSought;
   if (position.gross_errors != MergePosition::kNotSought) return false;
-  return (!converged && scaled) || (!rescaled && control_seems_wrong(job, tiles));
+  return (!converged && scaled) || (!rescaled && control_seems_wrong(lengths));
+}
+
+// Whether the sigmas are asked after the last adjustment: a block in which nothing changed after the one from afar
+// comes to it at once. Their factors give it further rounds.
+bool asks_for_scales(const MergeSettings& settings, const MergePosition& position) {
+  return settings.scale_contradicted_sigmas && position.rounds_afar > 0 && !position.scales.matter();
 }
 
 // Begins from afar again, because a gross error bends the block, until good observations seem wrong.
@@ -220,6 +226,13 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
     block = gather_state(job, block, tiles, runner);
     follow(block, tiles);
     if (last) {
+      if (asks_for_scales(job.settings.merge, position) &&
+          adopt_contradicted_scales(job, prior_lengths(job, tiles), tiles, position.scales)) {
+        position.first_round = ++position.round;
+        begin_adjustment(position, options);
+        checkpoint.write(position, tiles, block);
+        continue;
+      }
       find_posterior(job, inputs, references, runner, adjusted);
       if (judge_priors(job, adjusted.prior_tests, tiles, position)) {
         begin_again(position, options);
@@ -232,10 +245,11 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
       break;
     }
     const bool scaled = position.scales.matter();
-    const bool rescaled =
-        near && job.settings.merge.scale_contradicted_sigmas && adopt_contradicted_scales(job, tiles, position.scales);
-    if (asks_for_tests(job, position, adjusted.converged, scaled, rescaled, tiles) &&
-        judge_priors(job, test_priors(runner), tiles, position)) {
+    const PriorLengths lengths = near ? prior_lengths(job, tiles) : PriorLengths();
+    const bool rescaled = near && job.settings.merge.scale_contradicted_sigmas &&
+                          adopt_contradicted_scales(job, lengths, tiles, position.scales);
+    if (asks_for_tests(position, adjusted.converged, scaled, rescaled, lengths) &&
+        judge_priors(job, prior_tests(runner), tiles, position)) {
       begin_again(position, options);
       checkpoint.write(position, tiles, block);
       continue;

@@ -43,11 +43,11 @@ TileAdjustment snapshot(const RankTile& tile) {
 std::string tile_unit(const std::string& folder, std::int64_t tile) { return unit_name(folder, tile); }
 
 // The layout of the marker as docs/reference/file-formats.md describes it.
-static_assert(sizeof(MergePosition) == 144 + 8 * kObservationKinds + 24 * 32 &&
+constexpr std::size_t kScaleBytes = 8 * kObservationKinds + 8 + 24 * SigmaScales::kMostGroups;
+static_assert(sizeof(SigmaScales) == kScaleBytes && sizeof(MergePosition) == 144 + kScaleBytes + 24 * 32 &&
               offsetof(MergePosition, tried_steps) == 4 && offsetof(MergePosition, global) == 8 &&
-              offsetof(MergePosition, scales) == 112 &&
-              offsetof(MergePosition, rounds_afar) == 112 + 8 * kObservationKinds &&
-              offsetof(MergePosition, first_round) == 120 + 8 * kObservationKinds &&
+              offsetof(MergePosition, scales) == 112 && offsetof(MergePosition, rounds_afar) == 112 + kScaleBytes &&
+              offsetof(MergePosition, first_round) == 120 + kScaleBytes &&
               offsetof(GlobalState, lambda) == 8 && offsetof(GlobalState, decrement_squared) == 48 &&
               offsetof(GlobalState, accepted) == 84 && offsetof(GlobalState, curvature) == 88 &&
               offsetof(GlobalState, held) == 100);

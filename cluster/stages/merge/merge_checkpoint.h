@@ -38,7 +38,8 @@ struct MergePosition {
   SigmaScales scales;            // factors of the stated sigmas
   std::int32_t rounds_afar = 0;  // ended adjustments with losses that pull from any distance (prior_scales.h)
   std::int32_t near = 0;         // 1: the losses are those of the options
-  std::int64_t first_round = 0;  // round in which the block last began again, to seek gross errors or without them
+  // Round in which the block last began again: to seek gross errors or without them, or with sigmas of other factors.
+  std::int64_t first_round = 0;
   enum Seeking : std::int64_t { kNotSought, kSought, kNoneFound };
   std::int64_t gross_errors = kNotSought;  // kSought: the block begins from afar to find them
   StoredVerdicts verdicts;

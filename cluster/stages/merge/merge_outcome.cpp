@@ -176,7 +176,7 @@ void find_posterior(const Job& job, const MergeInputs& inputs, const std::vector
   adjusted.parts.clear();
   adjusted.prior_tests = {};
   adjusted.posterior = runner.posterior([&](const RankTile& tile, const TileCovariance& covariance) {
-    adjusted.prior_tests.add(test_priors(tile.problem, tile.state, covariance.frames, covariance.points));
+    adjusted.prior_tests.add(prior_tests(tile, covariance));
     write_covariances(covariance_path(job, tile.tile), tile.problem, covariance);
     const auto t = static_cast<std::size_t>(tile.tile);
     const TrackSet tracks = read_split_tracks(job, inputs.tracks[t], inputs.adjusted[t]);
@@ -276,6 +276,8 @@ MergeOutcome make_outcome(const Job& job, Adjusted& adjusted, const Tiles& tiles
   outcome.observations = adjusted.posterior.observations;
   for (std::size_t k = 0; k < kObservationKinds; ++k)
     outcome.observations.kinds[k].scale = adjusted.position.scales.of[k];
+  const auto scales = adjusted.position.scales.of_groups();
+  outcome.position_scales.assign(scales.begin(), scales.end());
   return outcome;
 }
 

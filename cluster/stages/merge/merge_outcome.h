@@ -27,6 +27,7 @@ struct MergeOutcome {
   std::vector<FreePart> free_parts;
   std::vector<SeamCheck> seams;
   ObservationTable observations;
+  std::vector<PositionScale> position_scales;
 };
 
 // An adjusted block as one rank holds it.

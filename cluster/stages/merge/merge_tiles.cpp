@@ -116,29 +116,39 @@ void set_losses(const Job& job, const MergePosition& position, TileStore& tiles)
 namespace {
 
 void multiply_sigmas(const SigmaScales& change, TileStore& tiles, SigmaScales& scales) {
-  for (std::size_t k = 0; k < kObservationKinds; ++k) scales.of[k] *= change.of[k];
+  scales.multiply(change);
   for (std::size_t row = 0; row < tiles.size(); ++row)
     tiles.change(row, [&](RankTile& tile) { scale_sigmas(tile.problem, change); });
 }
 
-PriorLengths gather_lengths(const Job& job, TileStore& tiles) {
+std::array<LengthCounts*, 4> kinds_of(PriorLengths& lengths) {
+  return {&lengths.position_horizontal, &lengths.position_height, &lengths.control_horizontal, &lengths.control_height};
+}
+
+}  // namespace
+
+PriorLengths prior_lengths(const Job& job, TileStore& tiles) {
   PriorLengths lengths;
   for (std::size_t row = 0; row < tiles.size(); ++row) {
     const RankTile& tile = tiles.whole(row);
     lengths.add(prior_lengths(tile.problem, tile.state));
   }
   ByteWriter writer;
-  writer.value(lengths);
+  for (const LengthCounts* counts : kinds_of(lengths)) writer.value(*counts);
+  writer.values(lengths.groups);
   PriorLengths all;
-  for (const Bytes& bytes : job.ranks.gather_all(writer.take())) all.add(ByteReader(bytes).value<PriorLengths>());
+  for (const Bytes& bytes : job.ranks.gather_all(writer.take())) {
+    ByteReader reader(bytes);
+    PriorLengths some;
+    for (LengthCounts* counts : kinds_of(some)) *counts = reader.value<LengthCounts>();
+    some.groups = reader.values<PriorLengths::OfGroup>();
+    all.add(some);
+  }
   return all;
 }
 
-}  // namespace
-
-bool control_seems_wrong(const Job& job, TileStore& tiles) {
+bool control_seems_wrong(const PriorLengths& lengths) {
   constexpr double kChance = 0.1;  // that one of n right points is so far off
-  const PriorLengths lengths = gather_lengths(job, tiles);
   const auto any = [&](const LengthCounts& counts) {
     const auto n = static_cast<double>(std::max<std::int64_t>(1, counts.total()));
     return counts.any_above(std::sqrt(2 * std::log(n / kChance)));  // P(|r| > x) = exp(-x^2 / 2) for two numbers
@@ -146,13 +156,15 @@ bool control_seems_wrong(const Job& job, TileStore& tiles) {
   return any(lengths.control_horizontal) || any(lengths.control_height);
 }
 
-bool adopt_contradicted_scales(const Job& job, TileStore& tiles, SigmaScales& scales) {
+bool adopt_contradicted_scales(const Job& job, PriorLengths lengths, TileStore& tiles, SigmaScales& scales) {
   constexpr double kSettled = 1.2;  // a smaller change needs no further adjustment: a median of few is no better
-  PriorLengths all = gather_lengths(job, tiles);
   // Those have factors from variance components.
-  if (job.settings.merge.estimate_sigmas) all.position_horizontal = all.position_height = {};
-  const SigmaScales change = contradicted_sigma_scales(scales, all);
-  if (std::ranges::all_of(change.of, [](double f) { return f < kSettled && f > 1 / kSettled; })) return false;
+  if (job.settings.merge.estimate_sigmas) {
+    lengths.position_horizontal = lengths.position_height = {};
+    lengths.groups.clear();
+  }
+  const SigmaScales change = contradicted_sigma_scales(scales, lengths);
+  if (!change.differ_by(kSettled)) return false;
   multiply_sigmas(change, tiles, scales);
   return true;
 }
@@ -164,11 +176,14 @@ bool adopt_sigma_scales(MergeTreeRunner& runner, TileStore& tiles, SigmaScales& 
   return true;
 }
 
-PriorTests test_priors(MergeTreeRunner& runner) {
+PriorTests prior_tests(const RankTile& tile, const TileCovariance& covariance) {
+  return test_priors(tile.problem, tile.state, {covariance.positions, covariance.positions_aside, covariance.points});
+}
+
+PriorTests prior_tests(MergeTreeRunner& runner) {
   PriorTests tests;
-  const auto posterior = runner.posterior([&](const RankTile& tile, const TileCovariance& covariance) {
-    tests.add(test_priors(tile.problem, tile.state, covariance.frames, covariance.points));
-  });
+  const auto posterior = runner.posterior(
+      [&](const RankTile& tile, const TileCovariance& covariance) { tests.add(prior_tests(tile, covariance)); });
   return posterior.gauge.free() ? PriorTests() : tests;
 }
 
@@ -203,15 +218,18 @@ bool judge_priors(const Job& job, const PriorTests& tests, TileStore& tiles, Mer
   const auto scaled = [&](ObservationKind horizontal, ObservationKind height) {
     return position.scales[horizontal] != 1 || position.scales[height] != 1;
   };
+  const bool group_scaled = std::ranges::any_of(position.scales.of_groups(), [](const PositionScale& scale) {
+    return scale.horizontal != 1 || scale.height != 1;
+  });
   const bool afar = position.near == 0;
   const ObservationOptions& options = job.settings.adjustment.observations;
   PriorTests all = gather_tests(job, tests);
   std::erase_if(all.far_off, [&](const PriorTest& test) {
     return !forgets(test.prior.is_control ? options.control_loss : options.position_loss);
   });
-  PriorVerdicts change =
-      change_verdicts(all, position.verdicts.get(),
-                      {scaled(kPositionHorizontal, kPositionHeight), scaled(kControlHorizontal, kControlHeight)});
+  PriorVerdicts change = change_verdicts(
+      all, position.verdicts.get(),
+      {group_scaled || scaled(kPositionHorizontal, kPositionHeight), scaled(kControlHorizontal, kControlHeight)});
   if (!afar && !change.aside.empty()) {
     if (position.gross_errors == MergePosition::kNoneFound) return false;
     position.gross_errors = MergePosition::kSought;

@@ -39,19 +39,23 @@ void follow(const BlockState& state, TileStore& tiles);
 // Gives the tiles the losses of the options, those that pull from any distance, or none where gross errors are sought
 // (prior_scales.h).
 void set_losses(const Job& job, const MergePosition& position, TileStore& tiles);
-// Collective. Multiplies the sigmas of positions and control points that are stated far too small (prior_scales.h).
-// Returns whether they have changed so much that another adjustment is needed.
-bool adopt_contradicted_scales(const Job& job, TileStore& tiles, SigmaScales& scales);
+// Collective. The residuals of the positions and control points of all ranks.
+PriorLengths prior_lengths(const Job& job, TileStore& tiles);
+// Multiplies the sigmas of positions and control points that are stated far too small (prior_scales.h). Returns whether
+// they have changed so much that another adjustment is needed.
+bool adopt_contradicted_scales(const Job& job, PriorLengths lengths, TileStore& tiles, SigmaScales& scales);
 
 // Collective. Whether the sigmas of positions, attitudes and relative poses have changed so much that another
 // adjustment is needed.
 bool adopt_sigma_scales(MergeTreeRunner& runner, TileStore& tiles, SigmaScales& scales);
 
-// Collective. Whether some control point is far off the block.
-bool control_seems_wrong(const Job& job, TileStore& tiles);
+// Whether some control point is far off the block.
+bool control_seems_wrong(const PriorLengths& lengths);
 
-// Collective. The tests of the positions and control points of this rank's tiles at the solution.
-PriorTests test_priors(MergeTreeRunner& runner);
+// The tests of the positions and control points of a tile, from its covariances at the solution.
+PriorTests prior_tests(const RankTile& tile, const TileCovariance& covariance);
+// Collective. Those of all tiles of this rank.
+PriorTests prior_tests(MergeTreeRunner& runner);
 
 // Collective. Judges positions and control points by the tests of all ranks; `tests` are those of this rank's tiles.
 // Sets observations aside, where the block was adjusted without losses to find gross errors (`position` says so), or

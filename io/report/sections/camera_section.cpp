@@ -159,8 +159,13 @@ std::string receivers_table(const BlockResult& result) {
     add(rig, "change of it [m]", receiver.lever_arm_change, receiver.lever_arm_sigma, 3);
     add(rig, "boresight [°]", receiver.boresight, receiver.boresight_sigma, 4);
   }
-  for (const ShiftFigures& group : shifts_of(result))
-    add(result.block.rigs[group.group].name, "shift [m]", group.shift, group.sigma, 3);
+  for (const ShiftFigures& group : shifts_of(result)) {
+    const std::string& name = result.block.rigs[group.group].name;
+    add(name, "shift [m]", group.shift, group.sigma, 3);
+    if (const auto [rig, horizontal, height] = group.scale; horizontal != 1 || height != 1)
+      table.add({escape(name), "sigmas used / stated", fixed(horizontal, 1), fixed(horizontal, 1), fixed(height, 1), "",
+                 "", ""});
+  }
   if (table.empty()) return "";
   return "<h3>Receivers</h3>" +
          paragraph(

@@ -116,16 +116,26 @@ TEST(PriorTest, AnObservationComesBackThatAgreesWithTheBlockWithoutIt) {
   EXPECT_TRUE(back.aside.empty()) << "the block is first adjusted with it";
   tests.aside = {control_test(8, 6)};
   EXPECT_TRUE(change_verdicts(tests, {{control(8)}, {}}, {}).cleared.empty());
+  tests.aside.front() = {control(8), 0, 0, 0};  // not tested
+  EXPECT_TRUE(change_verdicts(tests, {{control(8)}, {}}, {}).cleared.empty());
   EXPECT_TRUE(aside_of({1, 2, 6, 1, 1.5}, {{}, {control(2)}}).empty()) << "it was tried before";
 }
 
 // The tests of a tile at its true poses, with the covariance of a block that is known twice as well as its
 // observations.
 PriorTests known_well(const SingleTile& tile) {
-  using Matrix6 = Eigen::Matrix<double, 6, 6>;
-  return test_priors(tile.problem, tile.truth(),
-                     std::vector<Matrix6>(tile.problem.frames.size(), 0.002 * Matrix6::Identity()),
-                     std::vector<Eigen::Matrix3d>(tile.problem.points.size(), 0.002 * Eigen::Matrix3d::Identity()));
+  const auto of = [&](const std::vector<TileProblem::PositionTerm>& terms) {
+    std::vector<Eigen::Matrix3d> covariances;
+    for (const auto& term : terms) {
+      const auto frame = static_cast<std::size_t>(term.frame.value);
+      const auto by_frame = linearise_position(tile.truth().frames[frame], term.prior).by_frame;
+      covariances.emplace_back(0.002 * by_frame * by_frame.transpose());
+    }
+    return covariances;
+  };
+  const auto positions = of(tile.problem.positions), positions_aside = of(tile.problem.positions_aside);
+  const std::vector<Eigen::Matrix3d> points(tile.problem.points.size(), 0.002 * Eigen::Matrix3d::Identity());
+  return test_priors(tile.problem, tile.truth(), {positions, positions_aside, points});
 }
 
 TEST(PriorTest, TestsWhatATileOwnsAndTakesItOut) {

@@ -113,7 +113,7 @@ TEST(PositionOffset, BecomesTheShiftOfAllPositions) {
   EXPECT_EQ(group.mounts.front().pose.centre, found->offset);
   EXPECT_GT(group.mounts.front().position_sigma_m, 100);
   EXPECT_EQ(block.state.mounts[after.group].front().centre, found->offset);
-  EXPECT_EQ(after.shifted, (Eigen::Matrix<std::uint8_t, 3, 1>(0, 0, 1)));
+  EXPECT_EQ(after.shifted, (ShiftAxes(0, 0, 1)));
   EXPECT_LT(
       (corrected(after, block.block, RigIndex(0), block.state.mounts).position - (before.position - found->offset))
           .norm(),

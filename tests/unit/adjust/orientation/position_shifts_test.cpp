@@ -65,7 +65,7 @@ TEST(PositionShifts, OfOneSideOfAStrip) {
   EXPECT_EQ(shift.others, 12u);
   EXPECT_EQ(shift.offset.head<2>(), Eigen::Vector2d::Zero());
   EXPECT_NEAR(shift.offset.z(), 30, 1.5);
-  EXPECT_EQ(shift.shifted, (Eigen::Matrix<std::uint8_t, 3, 1>(0, 0, 1)));
+  EXPECT_EQ(shift.shifted, (ShiftAxes(0, 0, 1)));
   for (const FrameIndex f : flight.frames)
     if (f.value < 12) {
       const Eigen::Vector3d moved = found.to_others(flight.state.frames[f]).centre;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <random>
 
+#include "adjust/orientation/position_offset.h"
+#include "adjust/tile/sigma_scales.h"
 #include "tests/support/adjust/single_tile.h"
 
 namespace megablock {
@@ -67,6 +69,98 @@ TEST(PriorScales, LeaveSigmasThatAreTwiceTooSmall) {
   SimulatedBlock simulated = simulate_block(with_control());
   for (Frame& frame : simulated.block.frames) frame.position_prior->sigma /= 2;
   EXPECT_FALSE(contradicted_sigma_scales({}, lengths_at_truth(std::move(simulated))).matter());
+}
+
+// Of two groups of positions one is stated five times too good, and one has too few positions to tell.
+TEST(PriorScales, GroupsOfPositionsHaveTheirOwn) {
+  SimulatedBlock simulated = simulate_block(with_control());
+  std::vector<FrameIndex> worse, few;
+  for (std::int64_t f = 10; f < 30; ++f) worse.emplace_back(f);
+  for (std::int64_t f = 40; f < 43; ++f) few.emplace_back(f);
+  add_position_group(worse, {0, 0, 20}, {0, 0, 1}, simulated.block, simulated.truth);
+  add_position_group(few, {1, 2, 3}, {1, 1, 1}, simulated.block, simulated.truth);
+  for (const FrameIndex f : worse) {
+    simulated.block.frames[f].position_prior->position.z() += 20;
+    simulated.block.frames[f].position_prior->sigma /= 5;
+  }
+  for (const FrameIndex f : few) {
+    simulated.block.frames[f].position_prior->position += Eigen::Vector3d(1, 2, 3);
+    simulated.block.frames[f].position_prior->sigma /= 5;
+  }
+  const RigIndex group = simulated.block.frames[worse.front()].position_prior->group;
+  const RigIndex group_of_few = simulated.block.frames[few.front()].position_prior->group;
+  const PriorLengths lengths = lengths_at_truth(simulated);
+  SigmaScales scales = contradicted_sigma_scales({}, lengths);
+  ASSERT_EQ(scales.group_count, 1);
+  EXPECT_NEAR(scales.of_positions(group).horizontal, 5, 2);
+  EXPECT_NEAR(scales.of_positions(group).height, 5, 2);
+  EXPECT_EQ(scales.of_positions(group_of_few).height, 1);
+  EXPECT_EQ(scales[kPositionHeight], 1);
+  // The sigmas of the group alone are multiplied, and asked for no further factor.
+  SingleTile tile(simulated);
+  scale_sigmas(tile.problem, scales);
+  tile.state = tile.truth();
+  for (const auto& term : tile.problem.positions) {
+    const PositionPrior& stated =
+        *simulated.block.frames[tile.problem.frames[static_cast<std::size_t>(term.frame.value)]].position_prior;
+    EXPECT_DOUBLE_EQ(term.prior.sigma.z(), stated.sigma.z() * (stated.group == group ? scales.groups[0].height : 1));
+  }
+  EXPECT_FALSE(contradicted_sigma_scales(scales, prior_lengths(tile.problem, tile.state)).differ_by(1.1));
+}
+
+// Another factor of the kind does not change those of a group; a group without its own has those of the kind.
+TEST(SigmaScales, OfGroupsTakeThePlaceOfThoseOfTheKind) {
+  SigmaScales scales, change;
+  scales[kPositionHeight] = 4;
+  EXPECT_EQ(scales.of_positions(RigIndex(7)).height, 4);
+  change.set_positions({RigIndex(7), 1, 2});
+  change.set_positions({RigIndex(3), 5, 1});
+  change[kPositionHeight] = 3;
+  scales.multiply(change);
+  EXPECT_EQ(scales.groups[0].group, RigIndex(3));
+  EXPECT_EQ(scales.of_positions(RigIndex(3)).horizontal, 5);
+  EXPECT_EQ(scales.of_positions(RigIndex(3)).height, 4);
+  EXPECT_EQ(scales.of_positions(RigIndex(7)).height, 8);
+  EXPECT_EQ(scales.of_positions(RigIndex()).height, 12);
+  EXPECT_TRUE(scales.differ_by(11));
+  EXPECT_FALSE(scales.differ_by(13));
+  for (std::int64_t group = 10; group < 100; ++group) scales.set_positions({RigIndex(group), 2, 2});
+  EXPECT_EQ(scales.group_count, 32);
+}
+
+// Forty groups that are all stated ten times too good: those without a place count together.
+TEST(PriorScales, OfMoreGroupsThanHaveAPlace) {
+  PriorLengths lengths;
+  for (std::int64_t g = 0; g < 40; ++g)
+    for (int i = 0; i < 10; ++i)
+      lengths.of(RigIndex(g)).horizontal.add(11.774), lengths.of(RigIndex(g)).height.add(6.745);
+  const SigmaScales scales = contradicted_sigma_scales({}, lengths);
+  EXPECT_EQ(scales.group_count, 32);
+  for (std::int64_t g = 0; g < 40; ++g) {
+    // Of 1200 numbers and ten in a group. A bin of the median is 9 % wide.
+    const double factor = 10 / std::sqrt(1 - 7 / 1200.0 - (g < 32 ? 0.1 : 0));
+    EXPECT_NEAR(scales.of_positions(RigIndex(g)).horizontal, factor, 0.05 * factor) << g;
+    EXPECT_NEAR(scales.of_positions(RigIndex(g)).height, factor, 0.05 * factor) << g;
+  }
+}
+
+// A group whose factor was too large gets a smaller one, and keeps it when it has too few positions left.
+TEST(PriorScales, OfGroupsAreTakenBack) {
+  SigmaScales now;
+  now.set_positions({RigIndex(2), 8, 8});
+  PriorLengths lengths;
+  for (int i = 0; i < 10; ++i)
+    lengths.of(RigIndex(2)).horizontal.add(1.1774 / 8), lengths.of(RigIndex(2)).height.add(0.6745);
+  SigmaScales change = contradicted_sigma_scales(now, lengths);
+  EXPECT_DOUBLE_EQ(change.of_positions(RigIndex(2)).horizontal, 1.0 / 8);
+  const double factor = 1 / std::sqrt(1 - 7 / 30.0 - 0.1);  // of thirty numbers
+  EXPECT_NEAR(change.of_positions(RigIndex(2)).height, factor, 0.05 * factor);
+  lengths = {};
+  for (int i = 0; i < 3; ++i) lengths.of(RigIndex(2)).horizontal.add(100);
+  for (int i = 0; i < 10; ++i) lengths.position_horizontal.add(1);
+  change = contradicted_sigma_scales(now, lengths);
+  EXPECT_EQ(change.of_positions(RigIndex(2)).horizontal, 1);
+  EXPECT_EQ(change[kPositionHorizontal], 1);
 }
 
 // A factor that was too large is taken back, to the stated sigmas where these hold.

@@ -178,6 +178,9 @@ TEST(Receivers, ShiftsAreShownAlongTheirAxes) {
   EXPECT_LT((shifts[0].sigma - Eigen::Vector3d(0, 0, 0.02)).norm(), 1e-12);
   EXPECT_EQ(shift_text(result, shifts[0]),
             "in the adjusted block the positions of a.jpg and 8 more lie 46.90 m above their places (sigma 0.02 m)");
+  result.position_scales = {{RigIndex(1), 4, 1}};
+  EXPECT_THAT(shift_text(result, shifts_of(result)[0]),
+              HasSubstr("the adjustment used these times 4.0 (horizontal) and 1.0 (height)"));
   EXPECT_THAT(receivers_of(result), IsEmpty());
 }
 

@@ -17,6 +17,10 @@ TEST(UsedSigmas, AreTheStatedOnesTimesTheFactorsOfTheResult) {
   result.observation_table[ObservationKind::kPositionHeight].scale = 5;
   EXPECT_TRUE(used_sigma(result, point).isApprox(Eigen::Vector3d(0.1, 0.2, 0.03)));
   EXPECT_TRUE(used_sigma(result, prior).isApprox(Eigen::Vector3d(1, 2, 20)));
+  result.position_scales = {{RigIndex(4), 3, 1}};
+  EXPECT_TRUE(used_sigma(result, prior).isApprox(Eigen::Vector3d(1, 2, 20)));
+  prior.group = RigIndex(4);
+  EXPECT_TRUE(used_sigma(result, prior).isApprox(Eigen::Vector3d(3, 6, 4)));
 }
 
 }  // namespace

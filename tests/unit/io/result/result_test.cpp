@@ -68,6 +68,7 @@ BlockResult example_result() {
   result.free_parts = {{FrameIndex(0), 7}, {FrameIndex(1), 4}};
   result.positions_aside = {FrameIndex(1)};
   result.control_aside = {0};
+  result.position_scales = {{RigIndex(0), 3.5, 1}};
   for (std::size_t i = 0; i < result.block.images.size(); ++i)
     result.image_records.push_back({640, 480 + static_cast<int>(i), 100, 3, 70});
   result.provenance = {
@@ -107,6 +108,10 @@ TEST(ResultFile, EverythingComesBack) {
   EXPECT_EQ(back.empirical.mount_covariance, result.empirical.mount_covariance);
   EXPECT_EQ(back.boundary, result.boundary);
   EXPECT_EQ(back.tiles.tile_of_frame, result.tiles.tile_of_frame);
+  ASSERT_EQ(back.position_scales.size(), 1u);
+  EXPECT_EQ(back.position_scales[0].group, RigIndex(0));
+  EXPECT_EQ(back.position_scales[0].horizontal, 3.5);
+  EXPECT_EQ(back.position_scales[0].height, 1);
   EXPECT_EQ(back.tracks.id, result.tracks.id);
   EXPECT_EQ(back.tracks.begin, result.tracks.begin);
   EXPECT_EQ(back.tracks.image, result.tracks.image);

@@ -1,9 +1,13 @@
 // Posterior covariances of a small block of several tiles equal those of ceres::Covariance over one problem with
-// automatic derivatives: frames, cameras, mounts, points, and separator unknowns with one another.
+// automatic derivatives: frames, cameras, mounts, points, separator unknowns with one another, and the residuals of
+// positions.
 #include <ceres/covariance.h>
 #include <gtest/gtest.h>
 
+#include "adjust/checks/prior_test.h"
 #include "adjust/lanes/lane_kernels.h"
+#include "adjust/orientation/position_offset.h"
+#include "adjust/terms/terms.h"
 #include "adjust/tile/ceres_problem.h"
 #include "merge/tile/pair_blocks.h"
 #include "tests/support/merge/tiled_block.h"
@@ -16,6 +20,9 @@ struct CovarianceCase {
   SimulationOptions::Scene kind;
   bool calibrate = true, free_mounts = false;
   int rig_cameras = 2;
+  // Twelve positions have a shift, of which two and one other are set aside; one of these is alone in its group.
+  bool shifts = false;
+  bool receiver = false;  // lever arm and boresight are free
 };
 
 class CeresCovariance : public testing::TestWithParam<CovarianceCase> {
@@ -39,6 +46,25 @@ class CeresCovariance : public testing::TestWithParam<CovarianceCase> {
     if (id.kind == UnknownKind::kCamera) return whole_->camera(row(block.whole.cameras, CameraIndex(id.index)));
     return whole_->mount(row(block.whole.mounts, MountId{RigIndex(id.index), id.part}));
   }
+  // J C J' of a position's residual.
+  void expect_position(const Eigen::Matrix3d& ours, const TileProblem& problem, const TileState& state,
+                       const TileProblem::PositionTerm& term) {
+    const LinearTerm position = linearise_position(term, state);
+    const auto unknown_of = [&](const LinearTerm::Block& block) {
+      const auto r = static_cast<std::size_t>(block.row);
+      return block.by == LinearTerm::By::kFrame ? whole_->frame(row(whole_rows_->frames, problem.frames[r]))
+                                                : whole_->mount(row(whole_rows_->mounts, problem.mounts[r]));
+    };
+    Eigen::MatrixXd theirs = Eigen::Matrix3d::Zero();
+    for (int i = 0; i < position.block_count; ++i)
+      for (int j = 0; j < position.block_count; ++j) {
+        const auto &a = position.blocks[static_cast<std::size_t>(i)], &b = position.blocks[static_cast<std::size_t>(j)];
+        theirs += a.jacobian * of(unknown_of(a), unknown_of(b)) * b.jacobian.transpose();
+      }
+    EXPECT_LE((ours - theirs).cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), 1e-6 * theirs.diagonal().maxCoeff())
+        << "position of frame " << problem.frames[static_cast<std::size_t>(term.frame.value)].value;
+    ++positions_;
+  }
   template <typename Value>
   static std::int64_t row(const std::vector<Value>& table, const Value& value) {
     return static_cast<std::int64_t>(TiledBlock::row(table, value));
@@ -46,8 +72,9 @@ class CeresCovariance : public testing::TestWithParam<CovarianceCase> {
 
   std::unique_ptr<CeresTile> whole_;
   std::unique_ptr<ceres::Covariance> covariance_;
+  const TileProblem* whole_rows_ = nullptr;
   double largest_ = 0;
-  int compared_ = 0;
+  int compared_ = 0, positions_ = 0;
 };
 
 TEST_P(CeresCovariance, EqualsOurs) {
@@ -65,12 +92,31 @@ TEST_P(CeresCovariance, EqualsOurs) {
       rig.mounts[1].rotation_sigma_rad = 0.01;
       rig.mounts[1].position_sigma_m = 0.05;
     }
-  const TiledBlock block(std::move(simulated), 8, {}, 0.01);
+  if (GetParam().shifts) {
+    std::vector<FrameIndex> group;
+    for (std::int64_t f = 5; f < 15; ++f) group.emplace_back(f);
+    add_position_group(group, {0.1, -0.2, 0.3}, {1, 1, 1}, simulated.block, simulated.truth);
+    add_position_group({FrameIndex(1), FrameIndex(23)}, {0, 0, 3}, {0, 0, 1}, simulated.block, simulated.truth);
+  }
+  if (GetParam().receiver) {
+    Mount receiver;
+    receiver.rotation_sigma_rad = 0.01;
+    receiver.position_sigma_m = 0.1;
+    simulated.block.rigs.front().mounts.push_back(receiver);
+    simulated.truth.mounts.front().push_back(receiver.pose);
+  }
+  TiledBlock block(std::move(simulated), 8, {}, 0.01);
   ASSERT_GE(block.tiles.tile_count, 3);
+  if (GetParam().shifts) {
+    const std::vector<PriorId> aside{{1, 0}, {2, 0}, {8, 0}};
+    for (TileProblem& problem : block.problems) set_aside(aside, problem);
+    set_aside(aside, block.whole);
+  }
   MergeInMemory runner(block.tiles.tree, block.problems, block.states);
   EXPECT_TRUE(runner.final_up().sums.held.empty());
   const std::vector<TileCovariance> tiles = runner.covariances();
 
+  whole_rows_ = &block.whole;
   whole_ = std::make_unique<CeresTile>(block.whole, block.whole_state);
   ceres::Covariance::Options settings;
   settings.algorithm_type = ceres::SPARSE_QR;
@@ -91,6 +137,15 @@ TEST_P(CeresCovariance, EqualsOurs) {
       double* frame = whole_->frame(row(block.whole.frames, problem.frames[f]));
       expect(tiles[t].frames[f], frame, frame, "frame " + std::to_string(problem.frames[f].value));
     }
+    for (std::size_t p = 0; p < problem.positions.size(); ++p)
+      expect_position(tiles[t].positions[p], problem, block.states[t], problem.positions[p]);
+    for (std::size_t p = 0; p < problem.positions_aside.size(); ++p)
+      // Without another position of its group in the tile, nothing is known of the two together.
+      if (const std::int32_t group = problem.positions_aside[p].group;
+          group >= 0 && plan.unknown_of_mount[static_cast<std::size_t>(group)] < 0)
+        EXPECT_TRUE(tiles[t].positions_aside[p].isZero(0)), ++positions_;
+      else
+        expect_position(tiles[t].positions_aside[p], problem, block.states[t], problem.positions_aside[p]);
     for (std::size_t p = 0; p < problem.points.size(); ++p) {
       if (!problem.active(static_cast<std::int64_t>(p))) continue;
       double* point = whole_->point(static_cast<std::int64_t>(block.point_row(problem.points[p])));
@@ -105,7 +160,7 @@ TEST_P(CeresCovariance, EqualsOurs) {
     }
     for (std::size_t m = 0; m < problem.mounts.size(); ++m) {
       double* mount = whole_->mount(row(block.whole.mounts, problem.mounts[m]));
-      if (problem.mount_free[m]) expect(tiles[t].mounts[m], mount, mount, "mount");
+      if (plan.unknown_of_mount[m] >= 0) expect(tiles[t].mounts[m], mount, mount, "mount");
     }
     const CovarianceMatrix& boundary = tiles[t].boundary;
     for (const Unknown& a : boundary.unknowns)
@@ -116,12 +171,17 @@ TEST_P(CeresCovariance, EqualsOurs) {
       }
   }
   EXPECT_GT(compared_, 300);
+  EXPECT_EQ(positions_, 24);
   RecordProperty("largest_relative_difference", std::to_string(largest_));
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Scenes, CeresCovariance,
     testing::Values(CovarianceCase{"AerialSharedCamera", SimulationOptions::Scene::kAerial},
+                    CovarianceCase{"AerialShifts", SimulationOptions::Scene::kAerial, true, false, 2, true},
+                    CovarianceCase{"AerialShiftsAndReceiver", SimulationOptions::Scene::kAerial, true, false, 2, true,
+                                   true},
+                    CovarianceCase{"StreetReceiver", SimulationOptions::Scene::kStreet, true, true, 2, false, true},
                     CovarianceCase{"AerialHeldCamera", SimulationOptions::Scene::kAerial, false},
                     CovarianceCase{"StreetSharedCameras", SimulationOptions::Scene::kStreet},
                     CovarianceCase{"StreetFreeMounts", SimulationOptions::Scene::kStreet, true, true},
