@@ -94,12 +94,14 @@ void clear_scratch(const Job& job, bool use) {
 
 // Only the last round iterates to the end. The rounds before it only lead to decisions on observations and to sigmas. A
 // mean of a hundredth of a sigma of the frames' unknowns is enough for these: chi-square is then off by 1e-4 of their
-// number. A round between the first and the last starts near its end. Where two iterations do not get there, most
-// positions or control points are often beyond the corners of their losses, and larger sigmas are what they need.
-GlobalOptions options_of(const MergeSettings& settings, std::size_t frames, bool near, bool last) {
-  constexpr double kSettled = 0.01;
-  constexpr int kMostBetween = 2;
-  const double settled = kSettled * std::sqrt(6 * static_cast<double>(frames));
+// number. A tenth is enough for the first round, which only brings the block near its solution. A round between the
+// first and the last starts near its end. Where one iteration does not get there, most positions or control points are
+// often beyond the corners of their losses, and larger sigmas are what they need.
+GlobalOptions options_of(const MergeSettings& settings, std::size_t frames, const MergePosition& position, bool last) {
+  constexpr double kSettled = 0.01, kNearby = 0.1;
+  constexpr int kMostBetween = 1;
+  const bool near = position.near != 0, sought = position.gross_errors == MergePosition::kSought;
+  const double settled = (near || sought ? kSettled : kNearby) * std::sqrt(6 * static_cast<double>(frames));
   GlobalOptions options;
   options.max_decrement = last ? settings.decrement : std::max(settings.decrement, settled);
   options.confirm = last;
@@ -164,6 +166,11 @@ bool asks_for_scales(const MergeSettings& settings, const MergePosition& positio
   return settings.scale_contradicted_sigmas && position.rounds_afar > 0 && !position.scales.matter();
 }
 
+bool has_control(const Block& block) {
+  return std::ranges::any_of(block.control_points,
+                             [](const ControlPoint& point) { return point.role == PointRole::kControl; });
+}
+
 // Begins from afar again, because a gross error bends the block, until good observations seem wrong.
 void begin_again(MergePosition& position, const GlobalOptions& options) {
   position.first_round = ++position.round;
@@ -180,9 +187,8 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
       distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
   const std::optional<MergePosition> found = checkpoint.find();
   const MergePosition start =
-      found
-          ? *found
-          : MergePosition{0, 0, start_global(options_of(job.settings.merge, frames, false, false)), {}, 0, 0, 0, 0, {}};
+      found ? *found
+            : MergePosition{0, 0, start_global(options_of(job.settings.merge, frames, {}, false)), {}, 0, 0, 0, 0, {}};
   const MemoryOptions memory = memory_of_rank(job);
   SweepRecorder recorder(memory.scratch, job.options.record_s, stop_requested);
   const std::optional<MergePosition> within = checkpoint.find_sweep(start, recorder);
@@ -203,7 +209,7 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
         position.gross_errors != MergePosition::kSought && position.round >= most_rounds(job.settings.merge, position);
     if (last) position.near = 1;
     const bool near = position.near != 0;
-    const GlobalOptions options = options_of(job.settings.merge, frames, near, last);
+    const GlobalOptions options = options_of(job.settings.merge, frames, position, last);
     set_losses(job, position, tiles);
     MergeTreeRunner runner(job.ranks, inputs.tiles.tree, rank_of_tile, tiles, memory_of_factors(memory, tiles));
     runner.record_sweeps(recorder);
@@ -260,6 +266,7 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
     if (!near) {
       ++position.rounds_afar;
       position.near = adjusted.converged || position.rounds_afar == kMostRoundsAfar;
+      changed = changed || has_control(job.block);  // which is tested before the last round
     }
     position.round = changed ? position.round + 1 : most_rounds(job.settings.merge, position);
     begin_adjustment(position, options);
