@@ -11,7 +11,7 @@
 // that agree with them, until they no longer change.
 //
 // The first orientation of a block is bent by some pixels, and by more in long strips. A point agrees within
-// max(kControlMark_px, kAgree s), with s^2 the mean of the h smallest squares.
+// max(mark_px, kAgree s), with s^2 the mean of the h smallest squares.
 #include "adjust/orientation/control_alignment.h"
 
 #include <algorithm>
@@ -21,7 +21,6 @@
 #include <random>
 #include <utility>
 
-#include "adjust/orientation/steps/control_marks.h"
 #include "adjust/orientation/steps/levelling.h"
 #include "adjust/orientation/straight_line.h"
 #include "adjust/tile/consistent_rays.h"
@@ -39,6 +38,7 @@ constexpr std::size_t kMostSamples = 4000;  // all samples of three among 29 poi
 
 // A control point as the block sees it.
 struct SeenControl {
+  std::int64_t row = 0;  // of Block::control_points
   Eigen::Vector3d ground = Eigen::Vector3d::Zero();
   std::array<bool, 3> known{};  // coordinates
   std::vector<PointView> marks;
@@ -56,11 +56,11 @@ Eigen::Vector3d centroid(const std::vector<Eigen::Vector3d>& places) {
 
 class ControlAligner {
  public:
-  ControlAligner(const Block& block, const BlockState& state, const std::vector<FrameIndex>& frames)
-      : block_(block), state_(state), frames_(frames) {
+  ControlAligner(const Block& block, const BlockState& state, const std::vector<FrameIndex>& frames, double mark_px)
+      : block_(block), state_(state), frames_(frames), mark_px_(mark_px) {
     for (const FrameIndex frame : frames_)
       for (const Mount& mount : block.rig_of(frame).cameras()) metric_ = metric_ || mount.pose.centre.norm() > 0;
-    for (const ControlPoint& point : block.control_points) see(point);
+    for (std::size_t row = 0; row < block.control_points.size(); ++row) see(row);
   }
 
   std::optional<ControlAlignment> align() {
@@ -70,8 +70,14 @@ class ControlAligner {
     ControlAlignment result{*best_, std::ssize(points_)};
     std::vector<double> fitting;
     const double limit = limit_of(*best_);
-    for (const SeenControl& point : points_)
-      if (const double r = residual_px(*best_, point); r <= limit) fitting.push_back(r);
+    result.best_rms_px = best_rms_px(*best_);
+    for (const SeenControl& point : points_) {
+      const double r = residual_px(*best_, point);
+      if (r <= limit)
+        fitting.push_back(r);
+      else if (point.model)
+        result.misfits.push_back({point.row, r, off(*best_, point)});
+    }
     result.agreeing = std::ssize(fitting);
     if (2 * result.agreeing <= result.points || fitting.size() < 2) return std::nullopt;
     result.median_residual_px = median(std::move(fitting));
@@ -81,9 +87,11 @@ class ControlAligner {
   }
 
  private:
-  void see(const ControlPoint& point) {
+  void see(std::size_t row) {
+    const ControlPoint& point = block_.control_points[row];
     if (point.role != PointRole::kControl) return;
     SeenControl seen;
+    seen.row = static_cast<std::int64_t>(row);
     for (int axis = 0; axis < 3; ++axis) {
       seen.known[static_cast<std::size_t>(axis)] =
           std::isfinite(point.position[axis]) && point.sigma[axis] < kUnknownHeightSigma;
@@ -111,6 +119,13 @@ class ControlAligner {
     return median(std::move(distances));
   }
 
+  static Eigen::Vector3d off(const Similarity& similarity, const SeenControl& point) {
+    Eigen::Vector3d result = point.ground - similarity(*point.model);
+    for (int axis = 0; axis < 3; ++axis)
+      if (!point.known[static_cast<std::size_t>(axis)]) result[axis] = 0;
+    return result;
+  }
+
   // The number h of points that decide on a similarity.
   std::size_t decisive() const { return std::min(points_.size(), (points_.size() + 4) / 2); }
   // The sum of the h smallest squares.
@@ -125,9 +140,10 @@ class ControlAligner {
     for (std::size_t i = 0; i < decisive(); ++i) sum += squares[i];
     return sum;
   }
-  double limit_of(const Similarity& similarity) const {
-    return std::max(kControlMark_px, kAgree * std::sqrt(trimmed_squares(similarity) / static_cast<double>(decisive())));
+  double best_rms_px(const Similarity& similarity) const {
+    return std::sqrt(trimmed_squares(similarity) / static_cast<double>(decisive()));
   }
+  double limit_of(const Similarity& similarity) const { return std::max(mark_px_, kAgree * best_rms_px(similarity)); }
 
   void propose(const Similarity& similarity) {
     const double squares = trimmed_squares(similarity);
@@ -289,6 +305,7 @@ class ControlAligner {
   const Block& block_;
   const BlockState& state_;
   const std::vector<FrameIndex>& frames_;
+  double mark_px_;
   std::vector<SeenControl> points_;
   bool metric_ = false;
   std::optional<Similarity> best_;
@@ -298,8 +315,8 @@ class ControlAligner {
 }  // namespace
 
 std::optional<ControlAlignment> align_with_control(const Block& block, const BlockState& state,
-                                                   const std::vector<FrameIndex>& frames) {
-  return ControlAligner(block, state, frames).align();
+                                                   const std::vector<FrameIndex>& frames, double mark_px) {
+  return ControlAligner(block, state, frames, mark_px).align();
 }
 
 void move_frames(const Similarity& similarity, const std::vector<FrameIndex>& frames, BlockState& state) {

@@ -4,7 +4,8 @@
 A simulated block without positions hangs on six control points. Each point in turn gets a coordinate that is 10 m off,
 or a mark that is 100 px off. The poses must stay within one sigma of those that the block has without the wrong
 coordinates (the point is a check point there), or without the wrong mark. A second block is as small and its control as
-coarse that it bends to a wrong point: residuals alone do not show it. The same holds for a block with few positions.
+coarse that it bends to a wrong point: residuals alone do not show it. The same holds for a block with few positions, and
+for errors of metres to kilometres in a block of six images.
 """
 import csv
 import pathlib
@@ -79,7 +80,9 @@ class WrongControl(unittest.TestCase):
 
     def simulated(self, name, *options):
         block = self.work / name
-        megablock("simulate", "--frames", 12, *options, "-o", block)
+        if "--frames" not in options:
+            options = ("--frames", 12, *options)
+        megablock("simulate", *options, "-o", block)
         return block
 
     def test_a_coordinate_to_which_the_block_bends_is_named_and_moves_nothing(self):
@@ -93,6 +96,21 @@ class WrongControl(unittest.TestCase):
             _, right = self.run_changed(f"weak-check-{point}", check, block)
             said = self.spoil(f"weak-{point}", change, right, block)
             self.assertRegex(said, rf"1 of 6 control points differs.*takes no part: control{point} by ")
+
+    def test_an_error_of_any_size_is_named_and_moves_nothing(self):
+        """Six images with a wrong focal length: an outlier at the edge determines more of them than all others do."""
+        for datum, sigma in ("without", 0), ("with", 5):
+            block = self.simulated(f"few-{datum}", "--frames", 6, "--gps-sigma", sigma, "--control-points", 5,
+                                   "--start-focal", 0.92)
+            for point in 0, 2, 4:
+                def check(given, point=point):
+                    given["control/role"][point] = CHECK_POINT
+                _, right = self.run_changed(f"few-{datum}-check-{point}", check, block)
+                for error in 30, 11000:
+                    def change(given, point=point, error=error):
+                        given["control/position"][point, (point + error) % 3] += error
+                    said = self.spoil(f"few-{datum}-{point}-{error}", change, right, block)
+                    self.assertRegex(said, rf"1 of 5 control points differs.*takes no part: control{point} by ")
 
     def test_it_is_found_without_rounds_of_screening(self):
         block = self.simulated("unscreened", "--gps-sigma", 0, "--control-points", 6, "--control-sigma", 0.5)

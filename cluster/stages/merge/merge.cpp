@@ -119,13 +119,14 @@ void say_iteration(const Job& job, const GlobalState& state, const GlobalOptions
   say(job, kMergeStage, line);
 }
 
-// Loads this rank's tiles from their own adjustments, or from the checkpoint that was found. Returns the state of the
-// block.
+// Loads this rank's tiles from their own adjustments, or from the checkpoint that was found. Control points that the
+// tiles set aside are set aside in `position`, the beginning. Returns the state of the block.
 BlockState load_block(const Job& job, MergeInputs& inputs, const MergeCheckpoint& checkpoint,
                       const std::optional<MergePosition>& found, const std::vector<int>& rank_of_tile,
-                      TileStore& tiles) {
+                      MergePosition& position, TileStore& tiles) {
   MergeStart start =
       found ? MergeStart{checkpoint.state(), {}, {}, {}} : merge_start(job, inputs.oriented, inputs.adjusted);
+  position.verdicts.store({start.aside, {}});
   start.paths = paths_for_rolling_shutters(job.block);
   const double start_sigma = found ? 0 : start_image_sigma(job, inputs.adjusted);
   load_own_tiles(
@@ -134,10 +135,10 @@ BlockState load_block(const Job& job, MergeInputs& inputs, const MergeCheckpoint
         if (found) {
           checkpoint.load_tile(tile);
           scale_sigmas(tile.problem, found->scales);
-          set_aside(found->verdicts.get().aside, tile.problem);
         } else {
           set_image_sigma(tile.problem, start_sigma);
         }
+        set_aside(position.verdicts.get().aside, tile.problem);
       },
       tiles);
   return std::move(start.state);
@@ -186,7 +187,7 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
   const std::vector<int> rank_of_tile =
       distribute_tiles(inputs.tiles.tree, observation_counts(job, inputs), job.ranks.size());
   const std::optional<MergePosition> found = checkpoint.find();
-  const MergePosition start =
+  MergePosition start =
       found ? *found
             : MergePosition{0, 0, start_global(options_of(job.settings.merge, frames, {}, false)), {}, 0, 0, 0, 0, {}};
   const MemoryOptions memory = memory_of_rank(job);
@@ -196,7 +197,7 @@ Adjusted adjust_block(const Job& job, MergeInputs& inputs, MergeCheckpoint& chec
   TileStore tiles(memory);
   Adjusted adjusted;
   BlockState& block = adjusted.state;
-  block = load_block(job, inputs, checkpoint, found, rank_of_tile, tiles);
+  block = load_block(job, inputs, checkpoint, found, rank_of_tile, start, tiles);
   inputs.oriented = {};
   job.tables.release();
 

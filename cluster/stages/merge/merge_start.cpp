@@ -191,9 +191,12 @@ MergeStart merge_start(const Job& job, const BlockState& oriented, const std::ve
     if (adjusted[t].empty()) continue;
     TileAdjustment tile = read_adjustment(job.store.verified_path(adjusted[t]));
     means.add(tile);
+    for (const std::int64_t row : tile.control_aside) start.aside.push_back({row, 1});
     tiles.push_back({std::move(tile.frames), std::move(tile.poses), std::move(tile.observations)});
     numbers.emplace_back(static_cast<std::int64_t>(t));
   }
+  std::ranges::sort(start.aside);
+  start.aside.erase(std::ranges::unique(start.aside).begin(), start.aside.end());
   const std::vector<Similarity> motions = bring_together(job, tiles);
   for (std::size_t i = 0; i < tiles.size(); ++i) start.motions[static_cast<std::size_t>(numbers[i].value)] = motions[i];
   take_richest(tiles, numbers, start);

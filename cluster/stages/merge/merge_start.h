@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "adjust/checks/prior_test.h"
 #include "adjust/problem/frame_motion.h"
 #include "adjust/problem/tile_problem.h"
 #include "adjust/terms/build_problem.h"
@@ -36,6 +37,7 @@ struct MergeStart {
   IndexedVector<FrameIndex, TileIndex>
       tile_of_frame;  // the tile whose motion moved the frame; invalid when more than this motion did
   std::optional<FramePaths> paths = {};  // of blocks with rolling shutters
+  std::vector<PriorId> aside = {};       // control points that took no part in the adjustments of the tiles
 };
 MergeStart merge_start(const Job& job, const BlockState& oriented, const std::vector<std::string>& adjusted);
 

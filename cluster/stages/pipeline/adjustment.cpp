@@ -4,8 +4,10 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <tuple>
 #include <utility>
 
+#include "adjust/checks/control_check.h"
 #include "adjust/problem/environment_correction.h"
 #include "adjust/terms/build_problem.h"
 #include "adjust/tile/image_sigma.h"
@@ -119,16 +121,49 @@ TileStart with_parts(const Job& job, const OrientedTiles& from, TileIndex tile, 
   return split;
 }
 
+// What the images alone tell of a tile with control points.
+struct CheckedControl {
+  std::optional<TileState> start;  // the tile as the images alone give it, moved onto the control; none: not better
+  std::vector<PriorId> wrong;      // control points that contradict it
+};
+
+CheckedControl check_tile_control(const Job& job, const OrientedTiles& from, TileIndex tile, const TrackSet& tracks,
+                                  const AdjustOptions& options) {
+  const RobustLoss& loss = options.observations.control_loss;
+  if (loss.from_afar().kind == loss.kind) return {};  // no observation may be ignored
+  TileStart start = make_start(job, from, tile, tracks);
+  const std::vector<PriorId> control = testable_control(start.problem);
+  if (std::ssize(control) < kFewestControl) return {};
+  set_aside(control, start.problem);
+  try {
+    adjust_tile(start.problem, start.state, options, solve_by_condensation);
+  } catch (const ComputeError&) {
+    return {};  // the images alone do not hold the tile together
+  }
+  const auto check = check_control(job.block, from.oriented, start.problem, start.state);
+  if (!check) return {};
+  CheckedControl result{std::nullopt, check->wrong};
+  if (!start.problem.positions.empty()) return result;
+  for (Pose& pose : start.state.frames) pose = check->to_control(pose);
+  result.start = std::move(start.state);
+  return result;
+}
+
 TileAdjustment adjust_one(const Job& job, const OrientedTiles& from, TileIndex tile, const std::string& tracks_unit) {
   AdjustOptions options = job.settings.adjustment;
   options.only_start = true;
-  const std::string tracks = job.store.verified_path(tracks_unit);
-  TileStart adjusted = make_start(job, from, tile, read_tracks(tracks));
-  AdjustSummary summary = adjust_tile(adjusted.problem, adjusted.state, options, solve_by_condensation);
+  const TrackSet tracks = read_tracks(job.store.verified_path(tracks_unit));
+  const CheckedControl control = check_tile_control(job, from, tile, tracks, options);
+  const auto adjust = [&](const TileState* solved) {
+    TileStart start = make_start(job, from, tile, tracks, solved);
+    set_aside(control.wrong, start.problem);
+    const AdjustSummary summary = adjust_tile(start.problem, start.state, options, solve_by_condensation);
+    return std::pair(std::move(start), summary);
+  };
+  auto [adjusted, summary] = adjust(control.start ? &*control.start : nullptr);
   if (from.paths) {  // the poses tell the motion better than those of the orientation
     const TileState solved = std::move(adjusted.state);
-    adjusted = make_start(job, from, tile, read_tracks(tracks), &solved);
-    summary = adjust_tile(adjusted.problem, adjusted.state, options, solve_by_condensation);
+    std::tie(adjusted, summary) = adjust(&solved);
   }
   TrackParts parts = find_track_parts(adjusted.problem, adjusted.state,
                                       screening_threshold(adjusted.problem, adjusted.state, options), options);
@@ -166,6 +201,7 @@ TileAdjustment adjust_one(const Job& job, const OrientedTiles& from, TileIndex t
   result.points = std::move(state.points);
   result.kept = std::move(problem.kept);
   result.image_sigma_px = problem.image_sigma_px;
+  for (const PriorId& wrong : control.wrong) result.control_aside.push_back(wrong.row);
   result.summary = summary.text + ", " + std::to_string(restored) + " of them put back as tracks of their own";
   return result;
 }

@@ -31,6 +31,8 @@ void write_adjustment(const std::string& path, const TileAdjustment& adjustment)
               {"m", "ground frame; NaN: not triangulated"});
   file.group("observations", "of the tile's tracks, split into their parts, then of its control points");
   file.vector("observations/kept", adjustment.kept, {"", "1: kept, 0: rejected"});
+  file.group("control", "control points of the block");
+  file.vector("control/aside", adjustment.control_aside, {"", "rows of those that took no part"});
   file.close();
 }
 
@@ -56,6 +58,7 @@ TileAdjustment read_adjustment(const std::string& path) {
   const auto points = file.matrix<double>("points/position", 3);
   for (std::size_t p = 0; p < points.size() / 3; ++p) adjustment.points.push_back(vector3(points, p));
   adjustment.kept = file.vector<std::uint8_t>("observations/kept");
+  adjustment.control_aside = file.vector<std::int64_t>("control/aside");
   return adjustment;
 }
 

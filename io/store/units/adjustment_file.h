@@ -32,6 +32,8 @@ struct TileAdjustment {
   std::vector<Eigen::Vector3d> points;  // [tracks + control points]; NaN = not triangulated
   std::vector<std::uint8_t> kept;       // [observations of tracks, then of control points] 1 = kept
   double image_sigma_px = 0;            // of tie points, as used in the adjustment of the tile
+  // Rows of Block::control_points that took no part, because they contradict the images (adjust/checks/control_check.h).
+  std::vector<std::int64_t> control_aside;
   std::string summary;                  // one line for the log and the report
 };
 void write_adjustment(const std::string& path, const TileAdjustment& adjustment);
