@@ -9,8 +9,8 @@
 #include "cluster/outcome/diagnostics.h"
 #include "io/evaluation/evaluate.h"
 #include "io/evaluation/feature_statistics.h"
-#include "io/evaluation/control_remarks.h"
-#include "io/evaluation/remarks.h"
+#include "io/evaluation/remarks/control_remarks.h"
+#include "io/evaluation/remarks/remarks.h"
 #include "io/report/sections/sections.h"
 #include "io/result/track_batches.h"
 

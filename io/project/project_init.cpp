@@ -2,6 +2,8 @@
 // found.
 #include "io/project/project_init.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
@@ -133,6 +135,21 @@ std::string control_text(const std::vector<ControlPoint>& points) {
   return text;
 }
 
+// Names points that a single image sees. Empty if there are none.
+std::string lone_marks_text(const std::vector<ControlPoint>& points) {
+  constexpr std::int64_t kNamed = 5;
+  std::string names;
+  std::int64_t lone = 0;
+  for (const ControlPoint& point : points) {
+    if (point.measurements.size() != 1 || ++lone > kNamed) continue;
+    names += (lone > 1 ? ", " : "") + point.name;
+  }
+  if (lone == 0) return "";
+  return fmt::format("control: {} of {} {} marked in one image only, so that nothing can check {}: {}{}", lone,
+                     counted(std::ssize(points), "point"), lone == 1 ? "is" : "are", lone == 1 ? "it" : "them", names,
+                     lone > kNamed ? ", ..." : "");
+}
+
 std::string summary(const Project& project, const std::vector<Candidate>& candidates, const fs::path& folder,
                     const std::string& output) {
   std::int64_t positions = 0, attitudes = 0;
@@ -148,6 +165,7 @@ std::string summary(const Project& project, const std::vector<Candidate>& candid
   if (!project.unreadable.empty()) text << ", " << project.unreadable.size() << " unreadable files left out";
   text << ".";
   for (const std::string& line : project.found) text << "\n" << line;
+  if (const std::string lone = lone_marks_text(project.block.control_points); !lone.empty()) text << "\n" << lone;
   for (const Candidate& candidate : candidates) {
     text << "\nfound: " << candidate.input.key << ": " << path_for(candidate.input.files[0], folder) << " ("
          << candidate.input.describe << ")";

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "io/evaluation/control_remarks.h"
+#include "io/evaluation/remarks/control_remarks.h"
 #include "io/evaluation/receivers.h"
 #include "io/report/sections/sections.h"
 

@@ -7,7 +7,7 @@
 
 #include "io/block/track_rows.h"
 #include "io/evaluation/figures.h"
-#include "io/evaluation/remarks.h"
+#include "io/evaluation/remarks/remarks.h"
 #include "io/report/drawing/html.h"
 #include "io/report/drawing/page.h"
 #include "io/report/figures_json.h"

@@ -31,7 +31,7 @@ class Report {
   Report(Report&&) noexcept;
   // Figures that were gathered, for other summaries.
   const ReprojectionStatistics& statistics() const;
-  std::vector<std::string> remarks(const BlockResult& result) const;      // io/evaluation/remarks.h
+  std::vector<std::string> remarks(const BlockResult& result) const;      // io/evaluation/remarks/remarks.h
   std::string html(BlockResult result, const ReportContext& context) &&;  // consumes the gathered figures
 
  private:

@@ -47,7 +47,7 @@ double parse_number(const std::string& text, const std::string& what, const std:
     throw InputError(where + ": " + what + ": " + in_apostrophes(text) + " is not a number");
   if (!rest.empty())
     throw InputError(where + ": " + what + ": " + in_apostrophes(text) + " has text after the number (" +
-                     in_apostrophes(rest) + "); the unit is part of the key's name, write the number alone");
+                     in_apostrophes(rest) + "); write the number alone, its unit is fixed");
   if (!std::isfinite(value))
     throw InputError(where + ": " + what + ": " + in_apostrophes(text) + " is not a finite number");
   return value;

@@ -10,7 +10,7 @@
 #include "cluster/process/exit_codes.h"
 #include "geometry/similarity/similarity.h"
 #include "io/base/error.h"
-#include "io/evaluation/remarks.h"
+#include "io/evaluation/remarks/remarks.h"
 #include "io/result/result.h"
 #include "io/store/hdf5/hdf5_file.h"
 #include "tests/integration/block_folder.h"

@@ -174,9 +174,11 @@ class MapDrawing {
 
   std::string control_points() const {
     std::string svg;
-    for (const ControlPoint& point : result_.block.control_points) {
-      if (!point.position.head<2>().allFinite()) continue;
-      const Eigen::Vector2d p = plane_.at(point.position.head<2>());
+    for (std::size_t row = 0; row < result_.block.control_points.size(); ++row) {
+      const auto place = place_of_control(result_, row);
+      if (!place || !plane_.shows(plane_.at(*place))) continue;
+      const Eigen::Vector2d p = plane_.at(*place);
+      const ControlPoint& point = result_.block.control_points[row];
       svg += fmt::format("<path class={} d=\"M{:.1f} {:.1f}l7 12h-14z\"><title>{} {}</title></path>",
                          point.role == PointRole::kCheck ? "check" : "control", p.x(), p.y() - 8,
                          point.role == PointRole::kCheck ? "check point" : "control point", escape(point.name));

@@ -40,6 +40,10 @@ std::vector<Eigen::Vector2d> corners_of_tie_points(const BlockResult& result, co
   return {low, high};
 }
 
+bool is_seen(const BlockResult& result, std::size_t row) {
+  return row < result.control.size() && result.control[row].adjusted.allFinite();
+}
+
 }  // namespace
 
 Eigen::Vector2d Plane::at(const Eigen::Vector2d& ground) const {
@@ -73,6 +77,12 @@ bool is_of(const BlockResult& result, std::size_t track, const FrameSelection& s
   return selected(result.block.images[image].frame);
 }
 
+std::optional<Eigen::Vector2d> place_of_control(const BlockResult& result, std::size_t row) {
+  const Eigen::Vector2d place = is_seen(result, row) ? result.control[row].adjusted.head<2>()
+                                                     : result.block.control_points[row].position.head<2>();
+  return place.allFinite() ? std::optional(place) : std::nullopt;
+}
+
 std::optional<Eigen::Vector2d> place_of(const BlockResult& result, FrameIndex frame) {
   if (oriented(result, frame)) return result.state.frames[frame].centre.head<2>();
   if (const auto& prior = result.block.frames[frame].position_prior) return prior->position.head<2>();
@@ -90,9 +100,10 @@ std::optional<Plane> plane_of(const BlockResult& result, const FrameSelection& s
     if (oriented(result, f)) with_pose.push_back(*place);
   }
   std::vector<Eigen::Vector2d>& shown = with_pose.empty() ? all : with_pose;
-  if (with_control)
-    for (const ControlPoint& point : result.block.control_points)
-      if (point.position.head<2>().allFinite()) shown.emplace_back(point.position.head<2>());
+  // A point that no image sees may lie far away, as in the control list of a whole city.
+  for (std::size_t row = 0; with_control && row < result.block.control_points.size(); ++row)
+    if (const auto place = place_of_control(result, row); place && (shown.empty() || is_seen(result, row)))
+      shown.push_back(*place);
   if (shown.empty()) return std::nullopt;
   for (const Eigen::Vector2d& corner : corners_of_tie_points(result, selected, after_reading)) shown.push_back(corner);
   return plane_over(shown);

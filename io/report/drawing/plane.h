@@ -35,7 +35,7 @@ Plane plane_over(const std::vector<Eigen::Vector2d>& places);
 using FrameSelection = std::function<bool(FrameIndex)>;
 
 // Returns the plane that contains the selected frames that are oriented (or all selected frames if none is), their tie
-// points without the outermost 2 % on each side, and, if wanted, the control points with a position. The tie points are
+// points without the outermost 2 % on each side, and, if wanted, the control points that they see. The tie points are
 // needed because a facade lies beside the frames, not below them. Empty if nothing has a position. `after_reading` is
 // that of ReportContext.
 std::optional<Plane> plane_of(const BlockResult& result, const FrameSelection& selected, bool with_control,
@@ -46,6 +46,10 @@ bool is_of(const BlockResult& result, std::size_t track, const FrameSelection& s
 
 // The place where a frame is drawn: that of its pose, else its GNSS position.
 std::optional<Eigen::Vector2d> place_of(const BlockResult& result, FrameIndex frame);
+
+// The place where a control or check point is drawn: where the block sees it, else its coordinates. Wrong coordinates
+// thus do not spoil the scale of the map.
+std::optional<Eigen::Vector2d> place_of_control(const BlockResult& result, std::size_t row);
 
 // The parts of a map around its contents. Lengths are in metres, or in the units of a part with an arbitrary scale.
 std::string open_map(const Plane& plane, const std::string& label);

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "io/evaluation/control_remarks.h"
-#include "io/evaluation/remarks.h"
+#include "io/evaluation/remarks/control_remarks.h"
+#include "io/evaluation/remarks/remarks.h"
 #include "io/report/drawing/html.h"
 #include "io/report/sections/sections.h"
 

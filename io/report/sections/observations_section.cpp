@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "io/evaluation/reliability.h"
-#include "io/evaluation/remarks.h"
+#include "io/evaluation/remarks/remarks.h"
 #include "io/report/drawing/html.h"
 #include "io/report/sections/sections.h"
 

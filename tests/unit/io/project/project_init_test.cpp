@@ -46,6 +46,19 @@ TEST(InitProject, WritesWhatTheReaderReads) {
   EXPECT_THAT(message_of<InputError>([&] { init_project(options); }), HasSubstr("exists already"));
 }
 
+TEST(InitProject, NamesControlPointsWithOneMark) {
+  ScratchDirectory folder;
+  write_line(folder);
+  write_file(folder.path("images/gcp_list.txt"),
+             "WGS84\n-91.988 46.84 250 10 10 0.jpg pole\n"
+             "-91.988 46.84 250 20 20 0.jpg kerb\n-91.988 46.84 250 20 21 3.jpg kerb\n");
+  InitOptions options;
+  options.images = folder.path("images");
+  options.output = folder.path("block.yaml");
+  EXPECT_THAT(init_project(options),
+              HasSubstr("control: 1 of 2 points is marked in one image only, so that nothing can check it: pole"));
+}
+
 TEST(InitProject, LeavesNothingBehindWhenItFails) {
   ScratchDirectory folder;
   std::filesystem::create_directories(folder.path("images"));

@@ -162,7 +162,7 @@ TEST(Report, PointsThatNoMeasurementHoldsRaiseAnAlarm) {
   const std::string page = report_html(result);
   expect_sound(page);
   const std::string image = result.block.name_of(given.measurements[1].image);
-  EXPECT_THAT(page, HasSubstr("<li class=bad>1 control point takes no part: pillar (1.4e6 px in " + image));
+  EXPECT_THAT(page, HasSubstr("<li class=bad>1 control point takes no part: pillar (more than 100 000 px in " + image));
   EXPECT_THAT(page, HasSubstr("<tr class=\"bad\"><td class=t>pillar</td><td class=t>control</td><td>–</td>"
                               "<td>–</td><td>–</td>"));
   EXPECT_EQ(figures_in(page)["control_points_unused"], 1);

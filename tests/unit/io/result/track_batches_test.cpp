@@ -7,7 +7,7 @@
 #include <iterator>
 #include <utility>
 
-#include "io/evaluation/remarks.h"
+#include "io/evaluation/remarks/remarks.h"
 #include "io/report/report.h"
 #include "tests/support/io/made_up_result.h"
 #include "tests/support/io/scratch_directory.h"

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <limits>
 #include <regex>
 
 #include "io/report/drawing/drawing.h"
@@ -33,6 +34,24 @@ TEST(ReportDrawing, MapsAreFramedByFramesAndTiePoints) {
     if (f.value == 3) continue;  // not oriented
     EXPECT_TRUE(plane->shows(plane->at(result.state.frames[f].centre.head<2>())));
   }
+}
+
+// A control point with wrong coordinates is drawn where the block sees it; one that no image sees is left out.
+TEST(ReportDrawing, MapsAreNotFramedByWrongControl) {
+  const auto all = [](FrameIndex) { return true; };
+  SimulationOptions options{.frames = 60};
+  options.control_points = 6;
+  BlockResult result = made_up_result(options);
+  const auto right = report::plane_of(result, all, true, [] {});
+  result.block.control_points[2].position.x() += 11000;
+  result.block.control_points[3].position.y() -= 11000;
+  result.control[3].adjusted.setConstant(std::numeric_limits<double>::quiet_NaN());
+  const auto plane = report::plane_of(result, all, true, [] {});
+  ASSERT_TRUE(right && plane);
+  EXPECT_LE((plane->high - plane->low).maxCoeff(), (right->high - right->low).maxCoeff());
+  const std::string map = report::draw_map(result, all, "m", true, [] {});
+  EXPECT_THAT(map, HasSubstr(result.block.control_points[2].name + "</title>"));
+  EXPECT_THAT(map, testing::Not(HasSubstr(result.block.control_points[3].name + "</title>")));
 }
 
 TEST(ReportDrawing, TablesMayLeaveMemoryWhileMapsAreDrawn) {

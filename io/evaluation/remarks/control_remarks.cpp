@@ -1,4 +1,4 @@
-#include "io/evaluation/control_remarks.h"
+#include "io/evaluation/remarks/control_remarks.h"
 
 #include <fmt/core.h>
 
@@ -17,8 +17,7 @@ constexpr std::size_t kMarks = 3;  // number of marks of a point that a line nam
 std::string pixels(double value) {
   if (value < 100) return fmt::format("{:.1f}", value);
   if (value < 1e5) return fmt::format("{:.0f}", value);
-  const int power = static_cast<int>(std::floor(std::log10(value)));
-  return fmt::format("{:.1f}e{}", value / std::pow(10, power), power);
+  return "more than 100 000";  // beside or behind the camera
 }
 
 }  // namespace

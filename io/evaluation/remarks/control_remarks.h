@@ -32,7 +32,7 @@ struct UnusedPoint {
 // The unused points, worst first. Empty if the result has no points.
 std::vector<UnusedPoint> unused_points(const BlockResult& result, PointRole role);
 
-// "2 control points take no part: 3 (1.4e6 px in 02.jpg, 31 px in 04.jpg, rejected), 7 (not seen by an oriented
+// "2 control points take no part: 3 (more than 100 000 px in 02.jpg, 31 px in 04.jpg, rejected), 7 (not seen by an oriented
 // image)"; empty if there are none.
 std::string unused_points_text(const BlockResult& result, PointRole role);
 

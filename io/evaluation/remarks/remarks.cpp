@@ -1,4 +1,4 @@
-#include "io/evaluation/remarks.h"
+#include "io/evaluation/remarks/remarks.h"
 
 #include <fmt/core.h>
 
@@ -9,11 +9,12 @@
 
 #include "geometry/numbers/angles.h"
 #include "io/block/held_priors.h"
-#include "io/evaluation/control_remarks.h"
 #include "io/evaluation/figures.h"
 #include "io/evaluation/parts.h"
 #include "io/evaluation/position_groups.h"
 #include "io/evaluation/receivers.h"
+#include "io/evaluation/remarks/camera_remarks.h"
+#include "io/evaluation/remarks/control_remarks.h"
 #include "io/evaluation/used_sigmas.h"
 #include "io/result/result_option.h"
 #include "io/text/counted.h"
@@ -348,6 +349,7 @@ std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& 
 
 std::vector<std::string> remarks(const BlockResult& result, const report::Figures& figures) {
   std::vector<std::string> lines = datum_texts(result, figures);
+  for (std::string& text : camera_texts(result)) lines.push_back(std::move(text));
   for (std::string& text : misstated_texts(result)) lines.push_back(std::move(text));
   for (std::string& text : contradicted_texts(result, figures)) lines.push_back(std::move(text));
   if (std::string text = position_groups_text(result, figures.positions); !text.empty())

@@ -1,10 +1,10 @@
-#include "io/evaluation/control_remarks.h"
+#include "io/evaluation/remarks/control_remarks.h"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 
-#include "io/evaluation/remarks.h"
+#include "io/evaluation/remarks/remarks.h"
 #include "io/report/report.h"
 #include "tests/support/io/made_up_result.h"
 

@@ -1,4 +1,4 @@
-#include "io/evaluation/remarks.h"
+#include "io/evaluation/remarks/remarks.h"
 
 #include <gmock/gmock.h>
 
