@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "adjust/orientation/steps/control_marks.h"
 #include "geometry/numbers/median.h"
 #include "io/block/held_priors.h"
 #include "io/block/observed_poses.h"
@@ -28,7 +29,7 @@ bool has_position(const Block& block, const BlockState& state, FrameIndex frame)
 
 // What the control points say of one coordinate.
 struct Comparison {
-  std::vector<double> differences, control_sigmas, views, distances;  // metres; views: from the cameras to the point
+  std::vector<double> differences, control_sigmas, views;  // metres; views: from the cameras to the point
 };
 
 struct Difference {
@@ -36,7 +37,7 @@ struct Difference {
 };
 
 // The median of the differences, and its sigma where each has at least that of the control.
-Difference difference_of(const Comparison& c, double focal_share, const PoseAccuracy& poses) {
+Difference difference_of(const Comparison& c, double focal_share) {
   Difference found;
   found.offset = median(c.differences);
   std::vector<double> rest;
@@ -44,7 +45,7 @@ Difference difference_of(const Comparison& c, double focal_share, const PoseAccu
   found.scatter = kNormal * median(std::move(rest));
   const double of_one = std::max(found.scatter, median(c.control_sigmas));
   found.sigma = std::hypot(kOfMedian * of_one / std::sqrt(static_cast<double>(c.differences.size())),
-                           median(c.views) * focal_share, median(c.distances) * poses.direction_rad);
+                           median(c.views) * focal_share);
   return found;
 }
 
@@ -52,16 +53,13 @@ bool counts(const Difference& d, double position_sigma) {
   return std::abs(d.offset) > std::max({kOfOwnSigma * d.sigma, kOfPosition * position_sigma, kOfScatter * d.scatter});
 }
 
-// The prior sigma of the focal length over itself, the largest of the cameras that see control. A camera without a
-// prior still has a start that is good to some share.
+// The prior sigma of the focal length over itself, the largest of the cameras that see control.
 double focal_share_of(const Block& block) {
-  constexpr double kStated = 0.05, kGuessed = 0.3;
   double share = 0;
   for (const ControlPoint& point : block.control_points)
     for (const ImageMeasurement& mark : point.measurements) {
       const Camera& camera = block.cameras[block.camera_of(mark.image)];
-      const double prior = camera.prior_sigma[kFocal] / camera.intrinsics[kFocal];
-      share = std::max(share, std::min(prior, camera.focal_known ? kStated : kGuessed));
+      share = std::max(share, camera.prior_sigma[kFocal] / camera.intrinsics[kFocal]);
     }
   return share;
 }
@@ -75,7 +73,7 @@ Eigen::Vector3d mean_centre(const std::vector<PointView>& marks) {
 }  // namespace
 
 std::optional<PositionOffset> find_position_offset(const Block& block, const BlockState& state,
-                                                   const std::vector<FrameIndex>& frames, const PoseAccuracy& poses) {
+                                                   const std::vector<FrameIndex>& frames) {
   std::array<std::vector<double>, 3> position_sigmas;
   std::array<Comparison, 3> compared;
   for (const FrameIndex frame : frames) {
@@ -87,7 +85,7 @@ std::optional<PositionOffset> find_position_offset(const Block& block, const Blo
   }
   for (const ControlPoint& point : block.control_points) {
     if (point.role != PointRole::kControl) continue;
-    const SeenMarks seen = see_marks(block, state, frames, point, poses.mark_px);
+    const SeenMarks seen = see_marks(block, state, frames, point);
     if (!seen.place) continue;
     const Eigen::Vector3d view = *seen.place - mean_centre(seen.marks);
     for (int k = 0; k < 3; ++k) {
@@ -96,7 +94,6 @@ std::optional<PositionOffset> find_position_offset(const Block& block, const Blo
       c.differences.push_back((*seen.place)[k] - point.position[k]);
       c.control_sigmas.push_back(point.sigma[k]);
       c.views.push_back(view[k]);
-      c.distances.push_back(view.norm());
     }
   }
   const double focal_share = focal_share_of(block);
@@ -104,7 +101,7 @@ std::optional<PositionOffset> find_position_offset(const Block& block, const Blo
   for (int k = 0; k < 3; ++k) {
     const auto axis = static_cast<std::size_t>(k);
     if (compared[axis].differences.size() < kFewestPoints || position_sigmas[axis].empty()) continue;
-    const Difference d = difference_of(compared[axis], focal_share, poses);
+    const Difference d = difference_of(compared[axis], focal_share);
     if (!counts(d, median(position_sigmas[axis]))) continue;
     found.offset[k] = d.offset;
     found.sigma[k] = d.sigma;
@@ -112,23 +109,6 @@ std::optional<PositionOffset> find_position_offset(const Block& block, const Blo
   }
   if (found.offset.isZero(0)) return std::nullopt;
   return found;
-}
-
-void move_to_positions(const Block& block, const std::vector<FrameIndex>& frames, BlockState& state) {
-  std::array<std::vector<double>, 3> ahead;
-  for (const FrameIndex frame : frames) {
-    if (!has_position(block, state, frame)) continue;
-    const PositionPrior prior =
-        corrected(*block.frames[frame].position_prior, block, block.frames[frame].rig, state.mounts);
-    const Eigen::Vector3d of_block = difference(state.frames[frame], prior);
-    for (std::size_t k = 0; k < 3; ++k)
-      if (prior.sigma[static_cast<int>(k)] < kKnown) ahead[k].push_back(of_block[static_cast<int>(k)]);
-  }
-  Eigen::Vector3d move = Eigen::Vector3d::Zero();
-  for (std::size_t k = 0; k < 3; ++k)
-    if (!ahead[k].empty()) move[static_cast<int>(k)] = -median(ahead[k]);
-  for (const FrameIndex frame : frames)
-    if (state.oriented[frame]) state.frames[frame].centre += move;
 }
 
 namespace {

@@ -6,15 +6,14 @@
 // coordinate k of the offset is
 //
 //     o_k = med d_ik,   d_i = X_i - G_i,   s_k = 1.4826 med |d_ik - o_k|,
-//     sigma_k^2 = 1.2533^2 max(s_k, q_k)^2 / n + (v_k sigma_f / f)^2 + (|v| sigma_d)^2,
+//     sigma_k^2 = 1.2533^2 max(s_k, q_k)^2 / n + (v_k sigma_f / f)^2,
 //
 // with G_i the given coordinates and q_k the median of their sigmas. The medians tolerate outliers at nearly half of
 // the n points. v is the median vector from the cameras to the points and sigma_f / f the prior sigma of the focal
 // length: the cameras have their places from the positions, so a focal length that is 1 % too long puts the ground 1 %
-// of the flying height too low, at every point alike. sigma_d is the sigma of viewing directions of poses that are
-// given, and not yet adjusted. A coordinate counts when it is three times its own sigma and five times that of a
-// position, and three times the scatter s_k: what differs by less is left to the weights, and what differs from point
-// to point is a bend of the block, and no offset.
+// of the flying height too low, at every point alike. A coordinate counts when it is three times its own sigma and five
+// times that of a position, and three times the scatter s_k: what differs by less is left to the weights, and what
+// differs from point to point is a bend of the block, and no offset.
 //
 // The control decides on the datum: the block is moved by -o, and the offset is the start of an unknown of the
 // adjustment, the shift that all positions have in common (io/block/observed_poses.h). They tell of one another as
@@ -27,7 +26,6 @@
 #include <string>
 #include <vector>
 
-#include "adjust/orientation/steps/control_marks.h"
 #include "io/block/block.h"
 
 namespace megablock {
@@ -38,22 +36,10 @@ struct PositionOffset {
   std::int64_t points = 0;                           // control points that were compared
 };
 
-// How good the poses are before they are adjusted.
-struct PoseAccuracy {
-  double mark_px = kControlMark_px;  // marks of a point agree within it
-  double direction_rad = 0;          // sigma of the viewing directions that images have in common
-};
-inline constexpr PoseAccuracy kGivenPoses{300, 0.05};
-
 // The offset of the positions of `frames`, which hang together in `state` and have its datum from them. Empty where no
 // coordinate counts, fewer than three points can be compared, or positions are held. `frames` ascend. Deterministic.
 std::optional<PositionOffset> find_position_offset(const Block& block, const BlockState& state,
-                                                   const std::vector<FrameIndex>& frames,
-                                                   const PoseAccuracy& poses = {});
-
-// Moves frames whose poses are given onto their positions, by the median of the differences. They may be in another
-// datum, for example in that of the control.
-void move_to_positions(const Block& block, const std::vector<FrameIndex>& frames, BlockState& state);
+                                                   const std::vector<FrameIndex>& frames);
 
 // Moves the frames by the offset, and gives it to their positions as the start of a shift. A group that has a shift
 // already keeps its own, larger by the offset; its positions outside `frames` keep theirs.

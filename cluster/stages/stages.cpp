@@ -74,8 +74,7 @@ void coverage(const Stage& stage, const Job& job, JobRecord& record, StageResult
   run_coverage(stage, job, record, results.tracks);
 }
 
-// Whether the report of the orientation may name single images. Where all poses are taken from the project, it does so
-// only for shifts of positions.
+// Whether the report of the orientation may name single images. It does not when all poses are taken from the project.
 bool orients_by_names(const Block& block) {
   return !block.verticals.empty() ||
          std::any_of(block.frames.begin(), block.frames.end(), [](const Frame& f) { return !f.given_pose; });
@@ -84,7 +83,7 @@ bool orients_by_names(const Block& block) {
 void orientation(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
   return_freed_memory();  // memory of the tracks
   job.tables.release();
-  if (orients_by_names(job.block) || seeks_shifts_of_given(job)) restore_names(job.store, results.own);
+  if (orients_by_names(job.block)) restore_names(job.store, results.own);
   results.oriented = run_orientation(stage, job, record, results.matches, results.own.block);
   release_names(results.own);
   job.tables.release();

@@ -149,39 +149,5 @@ class PositionGroups(unittest.TestCase):
         self.assertGreater(self.run_job(wrong)["position_rms_m"], 3 * self.run_job(right)["position_rms_m"])
 
 
-class GivenPoses(unittest.TestCase):
-    """Blocks whose poses are given are searched for shifts too."""
-
-    def run_changed(self, name, change, *options):
-        folder = work / name
-        megablock("simulate", "--scene", "aerial", "--frames", 40, *options, "-o", folder)
-        with h5py.File(folder / "given.h5", "r+") as given:
-            change(given)
-        megablock("run", folder / "block.yaml", "-j", folder / "job", "-q")
-        notes = " ".join(json.loads(megablock("status", folder / "job", "--json"))["notes"])
-        with h5py.File(folder / "job/result/block.h5") as result, h5py.File(folder / "truth.h5") as truth:
-            return notes, result["frames/centre"][:] - truth["frames/centre"][:]
-
-    def test_a_group_is_found(self):
-        def change(given):
-            given["frames/position_prior/position"][:16] += (4, 0, 30)
-        notes, errors = self.run_changed("given_group", change, "--gps-sigma", 0.03)
-        self.assertRegex(notes, r"16 positions .* lie .*(29\.9|30\.0)\d m above")
-        self.assertLess(numpy.abs(errors).max(), 0.2)
-
-    def test_heights_of_control(self):
-        def change(given):
-            given["control/position"][:, 2] -= 47
-        notes, errors = self.run_changed("given_control", change, "--gps-sigma", 0.02, "--control-points", 8)
-        # Poses that are not adjusted yet, and a focal length that only the adjustment tells (sigma of the shift 0.1 m).
-        self.assertRegex(notes, r"the positions lie 4\d\.\d* m above the control points")
-        self.assertRegex(notes, r"the positions of .* lie (46\.[789]|47\.[0-3])\d m above their places")
-        self.assertLess(numpy.abs(errors - (0, 0, -47)).max(), 0.4)
-
-    def test_right_positions_get_none(self):
-        notes, _ = self.run_changed("given_right", lambda given: None, "--gps-sigma", 0.02, "--control-points", 8)
-        self.assertNotIn("lie", notes)
-
-
 if __name__ == "__main__":
     unittest.main(verbosity=2)

@@ -7,7 +7,7 @@
 namespace megablock {
 
 SeenMarks see_marks(const Block& block, const BlockState& state, const std::vector<FrameIndex>& frames,
-                    const ControlPoint& point, double mark_px) {
+                    const ControlPoint& point) {
   SeenMarks seen;
   for (const ImageMeasurement& mark : point.measurements) {
     const Image& image = block.images[mark.image];
@@ -17,7 +17,7 @@ SeenMarks see_marks(const Block& block, const BlockState& state, const std::vect
         {camera_pose(state.frames[image.frame], mount), &state.cameras[block.camera_of(mark.image)], mark.pixel, 1});
   }
   // The seed only matters for more than nine marks.
-  if (const auto rays = find_consistent_rays(seen.marks, mark_px, 1)) seen.place = rays->point;
+  if (const auto rays = find_consistent_rays(seen.marks, kControlMark_px, 1)) seen.place = rays->point;
   return seen;
 }
 

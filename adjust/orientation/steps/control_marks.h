@@ -17,8 +17,8 @@ struct SeenMarks {
   std::optional<Eigen::Vector3d> place;  // in the frame of the state, where two marks or more agree
 };
 
-// `frames` ascend. The views refer to cameras of `state`. `mark_px`: within which marks agree.
+// `frames` ascend. The views refer to cameras of `state`.
 SeenMarks see_marks(const Block& block, const BlockState& state, const std::vector<FrameIndex>& frames,
-                    const ControlPoint& point, double mark_px = kControlMark_px);
+                    const ControlPoint& point);
 
 }  // namespace megablock

@@ -167,6 +167,11 @@ bool asks_for_scales(const MergeSettings& settings, const MergePosition& positio
   return settings.scale_contradicted_sigmas && position.rounds_afar > 0 && !position.scales.matter();
 }
 
+bool has_control(const Block& block) {
+  return std::ranges::any_of(block.control_points,
+                             [](const ControlPoint& point) { return point.role == PointRole::kControl; });
+}
+
 // Begins from afar again, because a gross error bends the block, until good observations seem wrong.
 void begin_again(MergePosition& position, const GlobalOptions& options) {
   position.first_round = ++position.round;

@@ -294,7 +294,8 @@ void settle_datum(const Stage& stage, const Job& job, JobRecord& record, Disjoin
     if (frame.given_pose) with_given_poses.insert(part);
     if (job.settings.adjustment.observations.use_position_priors && frame.position_prior) with_positions.insert(part);
   }
-  const bool any_control = has_control(block);
+  const bool any_control =
+      std::ranges::any_of(block.control_points, [](const auto& p) { return p.role == PointRole::kControl; });
   for (const auto& [part, frames] : parts) {
     if (with_given_poses.contains(part)) continue;
     if (!with_positions.contains(part)) {
@@ -310,38 +311,7 @@ void settle_datum(const Stage& stage, const Job& job, JobRecord& record, Disjoin
   }
 }
 
-// Finds groups of positions that contradict the others, and positions that contradict the control, in a block whose
-// poses are all given. These poses need not be in the datum of the positions, and stay where nothing is found.
-BlockState settle_given_datum(const Stage& stage, const Job& job, JobRecord& record, Block& own, BlockState given) {
-  if (!seeks_shifts_of_given(job)) return given;
-  BlockState moved = given;
-  std::vector<FrameIndex> frames;
-  for (FrameIndex f(0); job.block.frames.contains(f); ++f.value) frames.push_back(f);
-  const std::size_t rigs = own.rigs.size();
-  shift_groups(stage, job, record, frames, own, moved);
-  move_to_positions(own, frames, moved);
-  if (const auto offset = has_control(own) ? find_position_offset(own, moved, frames, kGivenPoses) : std::nullopt) {
-    shift_positions(*offset, frames, own, moved);
-    add_note(job, record, stage.name, offset_text(*offset));
-  }
-  return own.rigs.size() > rigs ? moved : given;
-}
-
 }  // namespace
-
-bool has_control(const Block& block) {
-  return std::ranges::any_of(block.control_points, [](const auto& p) { return p.role == PointRole::kControl; });
-}
-
-// The search holds a table of all frames on every rank.
-bool seeks_shifts_of_given(const Job& job) {
-  constexpr std::size_t kMostFrames = 20'000;
-  const auto& frames = job.block.frames;
-  return frames.size() <= kMostFrames && job.settings.orientation.shift_positions &&
-         job.settings.adjustment.observations.use_position_priors &&
-         std::ranges::all_of(frames, [](const Frame& frame) { return frame.given_pose.has_value(); }) &&
-         std::ranges::any_of(frames, [](const Frame& frame) { return frame.position_prior.has_value(); });
-}
 
 OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& record,
                                  const std::vector<std::string>& matches, Block& own) {
@@ -353,7 +323,7 @@ OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& 
   if (std::all_of(start.oriented.begin(), start.oriented.end(), [](std::uint8_t o) { return o != 0; })) {
     if (job.is_first_rank()) remove_record(job.store, stage.name);  // an earlier run may have needed the stage
     tell_of_verticals(stage, job, record, aside, all);
-    return {settle_given_datum(stage, job, record, own, given_orientation(stage, job, std::move(start))), {}, {}};
+    return {given_orientation(stage, job, std::move(start)), {}, {}};
   }
   if (matches.empty())
     throw AgreedError<InputError>(

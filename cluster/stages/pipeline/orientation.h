@@ -22,11 +22,6 @@ struct OrientationStage {
 OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& record,
                                  const std::vector<std::string>& matches, Block& own);
 
-bool has_control(const Block& block);  // control points, not only check points
-
-// Whether the positions of a block with given poses are searched for shifts. The names of images must be there then.
-bool seeks_shifts_of_given(const Job& job);
-
 // The message for a block of which no image could be oriented: the likely cause and the remedy. `only_turned`: that of
 // OrientationStage.
 std::string why_nothing_is_oriented(const Block& block, bool only_turned);
