@@ -53,17 +53,18 @@ std::optional<ControlCheck> check_control(const Block& block, const BlockState& 
   if (!hangs_together(problem)) return std::nullopt;
   BlockState adjusted = oriented;
   store_tile_state(problem, state, adjusted);
-  std::vector<FrameIndex> frames = problem.frames;
-  std::ranges::sort(frames);
-  const auto aligned = align_with_control(block, adjusted, frames, kMark_px);
+  const auto aligned = align_with_control(block, adjusted, problem.frames, kMark_px);
   if (!aligned || aligned->points < kFewestControl) return std::nullopt;
+  std::set<std::int64_t> own;
+  for (const auto& term : problem.point_priors_aside)
+    own.insert(problem.points[static_cast<std::size_t>(term.point.value)].index);
   ControlCheck check{aligned->similarity, {}};
   for (const ControlAlignment::Misfit& misfit : aligned->misfits) {
-    if (misfit.residual_px < kGross * aligned->best_rms_px) continue;
+    if (!own.contains(misfit.row) || misfit.residual_px < kGross * aligned->best_rms_px) continue;
     const Eigen::Vector3d sigma = block.control_points[static_cast<std::size_t>(misfit.row)].sigma;
     if ((misfit.off.array().abs() > kExplained * sigma.array()).any()) check.wrong.push_back({misfit.row, 1});
   }
-  if (5 * std::ssize(check.wrong) > aligned->points) return std::nullopt;
+  if (5 * std::ssize(check.wrong) > std::ssize(own)) return std::nullopt;
   return check;
 }
 

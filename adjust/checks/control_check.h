@@ -28,9 +28,10 @@ struct ControlCheck {
 std::vector<PriorId> testable_control(const TileProblem& problem);
 
 // `state`: the tile as adjusted without its control; `oriented`: the state of the block from which it was made. A point
-// is wrong that is much farther off than others, and than its stated sigmas explain. Empty where nothing can be said:
-// with fewer than five points, where images of the points do not hang together, and where more than a fifth of the
-// points are wrong.
+// is wrong that is much farther off than others, and than its stated sigmas explain. Points of other tiles help to find
+// the similarity, but are not judged: this tile sees them in images at its edge, which few tie points hold. Empty where
+// nothing can be said: with fewer than five points, where images of the points do not hang together, and where more
+// than a fifth of the points are wrong.
 std::optional<ControlCheck> check_control(const Block& block, const BlockState& oriented, const TileProblem& problem,
                                           const TileState& state);
 

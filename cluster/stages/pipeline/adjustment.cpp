@@ -4,7 +4,6 @@
 #include <functional>
 #include <limits>
 #include <optional>
-#include <tuple>
 #include <utility>
 
 #include "adjust/checks/control_check.h"
@@ -127,43 +126,47 @@ struct CheckedControl {
   std::vector<PriorId> wrong;      // control points that contradict it
 };
 
-CheckedControl check_tile_control(const Job& job, const OrientedTiles& from, TileIndex tile, const TrackSet& tracks,
+CheckedControl check_tile_control(const Job& job, const OrientedTiles& from, const TileStart& start,
                                   const AdjustOptions& options) {
   const RobustLoss& loss = options.observations.control_loss;
   if (loss.from_afar().kind == loss.kind) return {};  // no observation may be ignored
-  TileStart start = make_start(job, from, tile, tracks);
   const std::vector<PriorId> control = testable_control(start.problem);
   if (std::ssize(control) < kFewestControl) return {};
-  set_aside(control, start.problem);
+  TileProblem problem = start.problem;
+  TileState state = start.state;
+  set_aside(control, problem);
   try {
-    adjust_tile(start.problem, start.state, options, solve_by_condensation);
+    adjust_tile(problem, state, options, solve_by_condensation);
   } catch (const ComputeError&) {
     return {};  // the images alone do not hold the tile together
   }
-  const auto check = check_control(job.block, from.oriented, start.problem, start.state);
+  const auto check = check_control(job.block, from.oriented, problem, state);
   if (!check) return {};
   CheckedControl result{std::nullopt, check->wrong};
-  if (!start.problem.positions.empty()) return result;
-  for (Pose& pose : start.state.frames) pose = check->to_control(pose);
-  result.start = std::move(start.state);
+  if (!problem.positions.empty()) return result;
+  for (Pose& pose : state.frames) pose = check->to_control(pose);
+  result.start = std::move(state);
   return result;
 }
 
 TileAdjustment adjust_one(const Job& job, const OrientedTiles& from, TileIndex tile, const std::string& tracks_unit) {
   AdjustOptions options = job.settings.adjustment;
   options.only_start = true;
-  const TrackSet tracks = read_tracks(job.store.verified_path(tracks_unit));
-  const CheckedControl control = check_tile_control(job, from, tile, tracks, options);
-  const auto adjust = [&](const TileState* solved) {
-    TileStart start = make_start(job, from, tile, tracks, solved);
-    set_aside(control.wrong, start.problem);
-    const AdjustSummary summary = adjust_tile(start.problem, start.state, options, solve_by_condensation);
-    return std::pair(std::move(start), summary);
+  TileStart adjusted = make_start(job, from, tile, read_tracks(job.store.verified_path(tracks_unit)));
+  const CheckedControl control = check_tile_control(job, from, adjusted, options);
+  const auto begin_in = [&](const TileState& solved) {
+    adjusted = make_start(job, from, tile, std::move(adjusted.tracks), &solved);
   };
-  auto [adjusted, summary] = adjust(control.start ? &*control.start : nullptr);
+  const auto adjust = [&] {
+    set_aside(control.wrong, adjusted.problem);
+    return adjust_tile(adjusted.problem, adjusted.state, options, solve_by_condensation);
+  };
+  if (control.start) begin_in(*control.start);
+  AdjustSummary summary = adjust();
   if (from.paths) {  // the poses tell the motion better than those of the orientation
     const TileState solved = std::move(adjusted.state);
-    std::tie(adjusted, summary) = adjust(&solved);
+    begin_in(solved);
+    summary = adjust();
   }
   TrackParts parts = find_track_parts(adjusted.problem, adjusted.state,
                                       screening_threshold(adjusted.problem, adjusted.state, options), options);

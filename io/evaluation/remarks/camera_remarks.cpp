@@ -16,15 +16,13 @@ std::string camera_text(const Camera& camera, double focal, double sigma) {
   if (sigma > kWeak * focal)
     return fmt::format(
         "The focal length of camera '{}' is hardly determined: {:.0f} +- {:.0f} px; depths are uncertain by its share "
-        "of "
-        "{:.0f} %; give 'focal_px', or add positions, control points or images that look in other directions",
+        "of {:.0f} %; give 'focal_px', or add positions, control points or images that look in other directions",
         camera.name, focal, sigma, 100 * sigma / focal);
   const double stated = camera.intrinsics[kFocal];
   if (!camera.focal_known || std::abs(focal - stated) < std::max(kAnother * focal, kCertain * sigma)) return "";
   return fmt::format(
       "The focal length of camera '{}' is {:.0f} +- {:.0f} px in the block, {:.0f} % {} than the stated {:.0f} px: "
-      "check "
-      "the header or 'focal_px', and whether images were cropped or the lens zoomed",
+      "check the header or 'focal_px', and whether images were cropped or the lens zoomed",
       camera.name, focal, sigma, 100 * std::abs(focal / stated - 1), focal > stated ? "more" : "less", stated);
 }
 

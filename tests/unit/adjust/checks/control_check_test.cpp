@@ -80,6 +80,17 @@ TEST(ControlCheck, LeavesPointsThatAreAllOff) {
   EXPECT_EQ(tile.check()->wrong, only(7));
 }
 
+// A tile sees points of its neighbours in images at its edge, which few tie points hold.
+TEST(ControlCheck, DoesNotJudgePointsOfOtherTiles) {
+  ShapedTile tile(6);
+  tile.control(2).position.x() += 30;
+  EXPECT_EQ(tile.check()->wrong, only(2));
+  std::erase_if(tile.problem.point_priors_aside, [&](const TileProblem::PointTerm& term) {
+    return tile.problem.points[static_cast<std::size_t>(term.point.value)].index == 2;
+  });
+  EXPECT_TRUE(tile.check()->wrong.empty());
+}
+
 TEST(ControlCheck, SaysNothingOfFewPoints) { EXPECT_FALSE(ShapedTile(4).check()); }
 
 TEST(ControlCheck, SaysNothingWhereMoreThanAFifthIsWrong) {
