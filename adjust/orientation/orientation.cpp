@@ -4,6 +4,8 @@
 //     first_centres()    directions and lengths of the baselines, and centres from them, up to a similarity
 //     check_verticals()  wrong verticals are set aside; the first two steps are repeated with the others
 //     to_ground()        a similarity to the observed positions; the centres are solved once more with them
+//     shape_by_images()  instead of it where hardly any position fits: the steps below without positions, then the
+//                        similarity
 //     position()         centres and points from the rays alone, rotations held
 //     adjust()           three adjustments of everything, with limits of 25, 10 and 4 px
 //
@@ -58,7 +60,9 @@ class Orientation {
       average();
       first_centres();
     }
-    to_ground();
+    const auto similarity = ground_similarity();
+    if (similarity && !any_given_ && shape_by_images(*similarity)) return;
+    if (similarity) to_ground(*similarity);
     position();
     adjust();
     if (!in_ground_) move(similarity_to_free_frame(graph_, values_, known_angles_, metric_rigs()));
@@ -235,20 +239,54 @@ class Orientation {
     }
   }
 
-  // Transforms rotations and centres to the observed positions and solves the centres once more with these as priors.
-  void to_ground() {
-    if (!any_position_) return;
+  // From the centres to the observed positions.
+  std::optional<Similarity> ground_similarity() {
+    if (!any_position_) return std::nullopt;
     intersect(3 * kDegree, 1 * kDegree);
+    return similarity_of_points();
+  }
+  std::optional<Similarity> similarity_of_points() const {
     // The median distance of the points tells an aerial block from a street, where positions on a line leave it open.
     const double distance =
         median_of_kept([](const Eigen::Vector3d&, const Eigen::Vector3d& inside) { return inside.norm(); });
-    const auto similarity = similarity_to_ground(graph_, values_, distance, known_angles_);
-    if (!similarity) return;
+    return similarity_to_ground(graph_, values_, distance, known_angles_);
+  }
+
+  // A narrow image hardly tells a small turn from a shift, so that the first centres of such images may be bent until
+  // hardly any position fits them, and the few that fit would turn the block anyhow. The images together give the shape
+  // of the block then, and the positions its place. Returns whether this was needed and more positions fit in the end;
+  // otherwise nothing changes.
+  bool shape_by_images(const Similarity& of_first_centres) {
+    constexpr double kMost = 0.5;  // share of the positions
+    const double first = share_that_fits(graph_, values_, of_first_centres);
+    if (first >= kMost) return false;
+    const OrientationValues values = values_;
+    const std::vector<std::string> reasons = reasons_;
+    try {
+      position();
+      adjust();
+      const auto similarity = similarity_of_points();
+      if (similarity && share_that_fits(graph_, values_, *similarity) > first) {
+        move(*similarity);
+        in_ground_ = true;
+        return true;
+      }
+    } catch (const ComputeError&) {
+      // The images alone do not hold the block together.
+    }
+    values_ = values;
+    reasons_ = reasons;
+    rays_ = viewing_rays(graph_, values_.cameras);
+    return false;
+  }
+
+  // Transforms rotations and centres to the observed positions and solves the centres once more with these as priors.
+  void to_ground(const Similarity& similarity) {
     in_ground_ = true;
     for (auto& rotation : rotations_)
       // R takes axes of the ground now; X_old = S' (X - t) / s leads to R S'.
-      if (rotation) rotation = (*rotation * similarity->rotation.conjugate()).normalized();
-    for (Baseline& baseline : baselines_) baseline.direction = similarity->rotation * baseline.direction;
+      if (rotation) rotation = (*rotation * similarity.rotation.conjugate()).normalized();
+    for (Baseline& baseline : baselines_) baseline.direction = similarity.rotation * baseline.direction;
     std::vector<std::optional<CentrePrior>> priors(graph_.frames.size());
     std::vector<std::optional<Eigen::Vector3d>> start(graph_.frames.size());
     for (std::size_t f = 0; f < priors.size(); ++f) {
@@ -260,9 +298,9 @@ class Orientation {
         priors[f] = CentrePrior{node.position->position - arm, node.position->sigma};
         start[f] = priors[f]->position;
       }
-      if (values_.frames[f]) start[f] = (*similarity)(values_.frames[f]->centre);
+      if (values_.frames[f]) start[f] = similarity(values_.frames[f]->centre);
     }
-    centres_from_baselines(similarity->scale, priors, start);
+    centres_from_baselines(similarity.scale, priors, start);
     restore_given();
   }
 
@@ -291,6 +329,7 @@ class Orientation {
       if (oriented() < 2) throw ComputeError("fewer than two images could be oriented");
       CoarseOptions coarse;
       coarse.observations = options_.observations;
+      coarse.use_positions = in_ground_;
       // Observations at the limit have three times Cauchy's scale, and a tenth of the weight.
       coarse.loss_scale_px = limit * smallest_focal() / 3;
       // The next round changes what takes part, so that the first two need not converge.

@@ -25,7 +25,7 @@ struct CoarseTile {
   std::vector<std::size_t> track;  // of each point
 };
 
-void add_frames(const OrientationGraph& graph, const OrientationValues& values, CoarseTile& tile) {
+void add_frames(const OrientationGraph& graph, const OrientationValues& values, bool use_positions, CoarseTile& tile) {
   tile.frame_row.assign(graph.frames.size(), -1);
   for (std::size_t f = 0; f < graph.frames.size(); ++f) {
     if (!values.frames[f]) continue;
@@ -34,7 +34,7 @@ void add_frames(const OrientationGraph& graph, const OrientationValues& values, 
     tile.problem.frames.push_back(graph.frames[f].index);
     tile.state.frames.push_back(*values.frames[f]);
     if (graph.frames[f].given) continue;
-    if (graph.frames[f].position) tile.problem.positions.push_back({row, *graph.frames[f].position});
+    if (graph.frames[f].position && use_positions) tile.problem.positions.push_back({row, *graph.frames[f].position});
     if (graph.frames[f].attitude) tile.problem.attitudes.push_back({row, *graph.frames[f].attitude});
   }
 }
@@ -123,7 +123,7 @@ void add_points(const OrientationGraph& graph, const OrientationValues& values, 
 void adjust_coarsely(const Block& block, const OrientationGraph& graph, const CoarseOptions& options,
                      OrientationValues& values) {
   CoarseTile tile;
-  add_frames(graph, values, tile);
+  add_frames(graph, values, options.use_positions, tile);
   add_cameras(block, graph, values, options, tile);
   add_verticals(block, graph, tile);
   add_points(graph, values, 1 / options.observations.image_sigma_px, tile);

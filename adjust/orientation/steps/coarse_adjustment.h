@@ -10,6 +10,7 @@ namespace megablock {
 
 struct CoarseOptions {
   ObservationOptions observations;         // sigmas and priors; the loss below replaces theirs
+  bool use_positions = true;               // of the graph; false before the block is in their coordinate frame
   double loss_scale_px = 4;                // Cauchy scale of image residuals
   std::vector<ParameterMask> camera_free;  // [graph.cameras] refined intrinsics
   int max_iterations = 20;

@@ -50,6 +50,12 @@ struct KnownPositions {
   double stated_sigma = 0;    // mean of the priors
 };
 
+constexpr double kFits = 4;  // sigmas
+
+bool fits(const KnownPositions& known, std::size_t i, const Similarity& similarity) {
+  return (similarity(known.from[i]) - known.to[i]).norm() <= kFits * known.sigma[i];
+}
+
 // The centres of oriented frames and the positions that are known of them, with sigmas that allow for the bend of the
 // first centres over the block: a twentieth of the median distance from its middle, in squares with the stated sigma.
 KnownPositions known_positions(const OrientationGraph& graph, const OrientationValues& values) {
@@ -121,7 +127,7 @@ std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, co
   double count = 0;
   for (int pass = 0; pass < 2; ++pass)
     for (std::size_t i = 0; i < known.to.size(); ++i) {
-      if (((*similarity)(known.from[i]) - known.to[i]).norm() > 4 * known.sigma[i]) continue;
+      if (!fits(known, i, *similarity)) continue;
       const Eigen::Vector3d moved = (*similarity)(known.from[i]);
       if (pass == 0)
         mean += moved, ++count;
@@ -158,6 +164,14 @@ std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, co
   similarity->rotation = rotation.normalized();
   similarity->translation = centre - similarity->scale * (similarity->rotation * before);
   return similarity;
+}
+
+double share_that_fits(const OrientationGraph& graph, const OrientationValues& values, const Similarity& to_ground) {
+  const KnownPositions known = known_positions(graph, values);
+  if (known.to.empty()) return 0;
+  double count = 0;
+  for (std::size_t i = 0; i < known.to.size(); ++i) count += fits(known, i, to_ground);
+  return count / static_cast<double>(known.to.size());
 }
 
 Similarity similarity_to_free_frame(const OrientationGraph& graph, const OrientationValues& values, GroundAngles known,

@@ -30,6 +30,10 @@ std::optional<AxisDirection> down_by_positions(const OrientationGraph& graph, co
 std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, const OrientationValues& values,
                                                double median_distance, GroundAngles known);
 
+// The share of the known positions that a similarity brings within four sigmas of the centres of their frames. The
+// sigmas allow for the bend of first centres, a twentieth of the extent of the positions.
+double share_that_fits(const OrientationGraph& graph, const OrientationValues& values, const Similarity& to_ground);
+
 // The similarity to the frame of a free block. Its origin is the centroid of the frames, and the mean baseline of
 // linked frames is one unit (unless `keep_scale`). The principal plane of the centres is horizontal, with the mean
 // viewing and y directions of the images downwards, and the frame farthest from the centroid lies on the positive x
