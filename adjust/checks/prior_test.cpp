@@ -36,6 +36,7 @@ constexpr double kUntested = 1e-6;  // redundancy
 constexpr std::array kMedians{1.0, 0.6745, 1.1774, 1.5382};
 constexpr double kChance = 0.01;         // that a block without gross errors has an observation that is far off
 constexpr double kPulls = 0.3;           // sigmas of the block: less is left to the loss
+constexpr double kPullsFew = 0.05;       // the same of few positions, which a block adjusts again at once
 constexpr double kEstimated = 1.25;      // a factor of sigmas from the median of ten residuals may be so much too small
 constexpr double kNearWorst = 0.7;       // share of the worst length
 constexpr std::int64_t kFew = 30;        // observations of a kind; one of so many is set aside at a time
@@ -47,11 +48,12 @@ double chance(const PriorTest& test, double factor) {
   return test.axes == 0 ? 1 : chi_square_exceeds(length * length, test.axes);
 }
 
-void add_test(const PriorId& id, PriorTest test, PriorTests& tests) {
+// `least`: pulls that count.
+void add_test(const PriorId& id, PriorTest test, double least, PriorTests& tests) {
   if (test.axes == 0) return;
   test.prior = id;
   (id.is_control ? tests.control : tests.positions).add(test.sigmas / kMedians[static_cast<std::size_t>(test.axes)]);
-  if (test.pull > kPulls && chance(test, 1) < kChance / kLeastKind) tests.far_off.push_back(test);
+  if (test.pull > least && chance(test, 1) < kChance / kLeastKind) tests.far_off.push_back(test);
 }
 
 // What is known of the positions, or of the control points.
@@ -61,6 +63,7 @@ struct PriorsOfKind {
   // By how much the sigmas may be too small; and by how much the lengths are larger than they should be, or this.
   double least = 1, excess = 1;
   bool far_off(const PriorTest& test) const {
+    if (test.pull < (all > kFew || test.prior.is_control ? kPulls : kPullsFew)) return false;
     return static_cast<double>(all) * chance(test, all > kFew ? excess : least) < kChance;
   }
   bool agrees(const PriorTest& test) const {
@@ -117,13 +120,15 @@ class PriorTester {
       : problem_(problem), state_(state), covariances_(covariances) {}
 
   PriorTests run() {
+    const bool few = std::ssize(problem_.positions) <= kFew;
     for (std::size_t i = 0; i < problem_.positions.size(); ++i) {
       const TileProblem::PositionTerm& term = problem_.positions[i];
       if (tells(term, covariances_.positions[i]))
-        add_test(id_of(term), test(term, covariances_.positions[i], loss_of(problem_, term)), tests_);
+        add_test(id_of(term), test(term, covariances_.positions[i], loss_of(problem_, term)), few ? kPullsFew : kPulls,
+                 tests_);
     }
     for (const auto& term : problem_.point_priors)
-      if (tells(term)) add_test(id_of(term), test(term, loss_of(problem_, term)), tests_);
+      if (tells(term)) add_test(id_of(term), test(term, loss_of(problem_, term)), kPulls, tests_);
     for (std::size_t i = 0; i < problem_.positions_aside.size(); ++i) {
       const TileProblem::PositionTerm& term = problem_.positions_aside[i];
       const Eigen::Matrix3d& covariance = covariances_.positions_aside[i];

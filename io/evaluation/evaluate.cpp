@@ -15,6 +15,7 @@
 #include "io/block/held_priors.h"
 #include "io/evaluation/free_datum.h"
 #include "io/evaluation/used_sigmas.h"
+#include "io/project/inputs/image_lookup.h"
 #include "io/result/result_option.h"
 #include "io/store/units/state_file.h"
 
@@ -61,23 +62,47 @@ class RootMeanSquare {
   std::int64_t count_ = 0;
 };
 
+// The rows of the truth by frame, by the name of the frame or of its first image; -1: none. Where no name is the same,
+// names of images may have other folders, case and ending, as in other lists (image_lookup.h).
+std::vector<std::int64_t> rows_by_frame(const Block& block, const std::vector<std::string>& names) {
+  std::unordered_map<std::string, std::int64_t> row;
+  for (std::size_t i = 0; i < names.size(); ++i) row.emplace(names[i], static_cast<std::int64_t>(i));
+  std::vector<std::int64_t> rows(block.frames.size(), -1);
+  std::vector<ImageIndex> first_image(block.frames.size());
+  bool any = false;
+  const auto take = [&](std::int64_t& of_frame, const std::string& name) {
+    const auto found = row.find(name);
+    if (of_frame >= 0 || found == row.end()) return;
+    of_frame = found->second;
+    any = true;
+  };
+  for (std::size_t f = 0; f < rows.size(); ++f)
+    take(rows[f], block.frames[FrameIndex(static_cast<std::int64_t>(f))].name);
+  for (ImageIndex i(0); block.images.contains(i); ++i.value) {
+    const auto f = static_cast<std::size_t>(block.images[i].frame.value);
+    if (first_image[f].valid()) continue;
+    first_image[f] = i;
+    take(rows[f], block.name_of(i));
+  }
+  if (any) return rows;
+  const ImageLookup lookup(block, {});
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const ImageLookup::Found found = lookup.find(names[i]);
+    if (found.kind != ImageLookup::Kind::kImage) continue;
+    const auto f = static_cast<std::size_t>(block.images[found.image].frame.value);
+    if (first_image[f] == found.image && rows[f] < 0) rows[f] = static_cast<std::int64_t>(i);
+  }
+  return rows;
+}
+
 // The oriented frames of the result with their true poses, in the order of the block.
 std::vector<Match> match_by_name(const BlockResult& result, const PoseTable& truth) {
-  std::unordered_map<std::string, std::size_t> row;
-  for (std::size_t i = 0; i < truth.names.size(); ++i) row.emplace(truth.names[i], i);
-  const Block& block = result.block;
-  std::vector<std::string> first_image(block.frames.size());
-  for (ImageIndex i(0); block.images.contains(i); ++i.value) {
-    std::string& name = first_image[static_cast<std::size_t>(block.images[i].frame.value)];
-    if (name.empty()) name = block.name_of(i);
-  }
+  const std::vector<std::int64_t> rows = rows_by_frame(result.block, truth.names);
   std::vector<Match> matches;
-  for (std::size_t f = 0; f < block.frames.size(); ++f) {
+  for (std::size_t f = 0; f < rows.size(); ++f) {
     const FrameIndex frame(static_cast<std::int64_t>(f));
-    if (!result.state.oriented[frame]) continue;
-    auto found = row.find(block.frames[frame].name);
-    if (found == row.end()) found = row.find(first_image[f]);
-    if (found != row.end()) matches.push_back({frame, truth.poses[found->second]});
+    if (result.state.oriented[frame] && rows[f] >= 0)
+      matches.push_back({frame, truth.poses[static_cast<std::size_t>(rows[f])]});
   }
   if (matches.empty())
     throw InputError("no oriented frame of the result has a true pose of the same name; the truth begins with '" +

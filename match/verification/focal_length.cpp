@@ -34,9 +34,14 @@ struct Sensor {
   double larger_side, half_diagonal;  // pixels
 };
 
+Sensor sensor_of(int width, int height) {
+  return {static_cast<double>(std::max(width, height)), 0.5 * std::hypot(width, height)};
+}
+
 // Steps of q, and its range in steps: from pincushion to barrel distortion.
 constexpr double kDistortionStep = 0.05;
 constexpr int kFewestSteps = -3, kMostSteps = 10;
+constexpr double kLikely = 2;  // sigmas of a loss of support
 
 PointPairs scaled(const PointPairs& points, double factor) {
   PointPairs result = points;
@@ -289,10 +294,10 @@ void FocalLengthOptions::check() const {
 std::optional<FocalLength> focal_length_of(std::size_t count, const MatchedBatch& pairs, int width, int height,
                                            const FocalLengthOptions& options) {
   options.check();
-  const Sensor sensor{static_cast<double>(std::max(width, height)), 0.5 * std::hypot(width, height)};
+  const Sensor sensor = sensor_of(width, height);
   const auto [usable, uncorrected] = usable_pairs(count, pairs, sensor, options);
   if (std::ssize(usable) < options.min_pairs) return std::nullopt;
-  const double q = find_distortion(usable, uncorrected, sensor, options);
+  const double q = options.distortion ? *options.distortion : find_distortion(usable, uncorrected, sensor, options);
   FocalLength found;
   found.distortion = q;
   found.asked = static_cast<int>(usable.size());
@@ -311,6 +316,29 @@ std::optional<FocalLength> focal_length_of(std::size_t count, const MatchedBatch
     for (std::size_t k = 0; k < votes.size(); ++k) found.votes[k] += votes[k];
   find_least_contradicted(found);
   return found;
+}
+
+std::vector<double> likely_distortions(std::size_t count, const MatchedBatch& pairs, int width, int height,
+                                       const FocalLengthOptions& options, const FocalLength& found) {
+  options.check();
+  const Sensor sensor = sensor_of(width, height);
+  const std::vector<MatchedImages> usable = usable_pairs(count, pairs, sensor, options).first;
+  const std::vector<double> best = supports_with(found.distortion, usable, sensor, options);
+  const auto likely = [&](double q) {
+    const std::vector<double> other = supports_with(q, usable, sensor, options);
+    double sum = 0, squares = 0;
+    for (std::size_t i = 0; i < best.size(); ++i) sum += best[i] - other[i], squares += std::pow(best[i] - other[i], 2);
+    return sum <= kLikely * std::sqrt(squares);
+  };
+  std::vector<double> all;
+  for (const int direction : {1, -1})
+    for (int step = direction;; step += direction) {
+      const double q = found.distortion + kDistortionStep * step;
+      if (q < kDistortionStep * kFewestSteps || q > kDistortionStep * kMostSteps || !likely(q)) break;
+      all.push_back(q);
+    }
+  std::ranges::stable_sort(all, {}, [&](double q) { return std::abs(q - found.distortion); });
+  return all;
 }
 
 // The grid hides what is finer than itself.

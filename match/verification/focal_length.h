@@ -31,6 +31,13 @@
 //     x (1 + q r^2 / R^2)                                    (R: half the diagonal of the image),
 //
 // and q is where the fundamental matrices have most support. The pairs then tell f from corrected points.
+//
+// Images of nearly flat ground hardly tell q: their support is the same from barrel to pincushion, and its peak lies
+// anywhere. With d_i, what a pair loses of its support by another q, that other one is as likely where
+//
+//     sum d_i <= 2 (sum d_i^2)^(1/2).
+//
+// A given focal length is wrong only where many pairs contradict it with every such q (likely_distortions()).
 #pragma once
 
 #include <cstdint>
@@ -49,7 +56,8 @@ struct FocalLengthOptions {
   int max_pairs = 40;                      // pairs that are asked, the first that have enough inliers
   int min_pairs = 5;                       // fewest such pairs
   int threads = 1;
-  void check() const;  // throws std::invalid_argument
+  std::optional<double> distortion;  // q of the head of this file; none: found from the pairs
+  void check() const;                // throws std::invalid_argument
 };
 
 // Two images of one camera.
@@ -80,5 +88,9 @@ using MatchedBatch = std::function<std::vector<MatchedImages>(std::size_t first,
 // fewer than min_pairs have enough inliers. The result is deterministic and does not depend on the threads.
 std::optional<FocalLength> focal_length_of(std::size_t count, const MatchedBatch& pairs, int width, int height,
                                            const FocalLengthOptions& options = {});
+
+// The other distortions that the same pairs allow besides that of the estimate `found`, the nearest ones first.
+std::vector<double> likely_distortions(std::size_t count, const MatchedBatch& pairs, int width, int height,
+                                       const FocalLengthOptions& options, const FocalLength& found);
 
 }  // namespace megablock

@@ -50,6 +50,8 @@
 // camera has a ratio of its own for its few parameters, from their part of C s_c.
 #pragma once
 
+#include <Eigen/Cholesky>
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <utility>
@@ -69,10 +71,24 @@ inline constexpr double kMeanShare = 0.5;
 // f g and f rho, of the sums over the block.
 ClusterWeights cluster_weights(const ImageSpread& spread);
 
-// C_e from C(0) and C(w).
+// C_e from C(0) and C(w), without the check of empirical_covariance().
 template <typename Matrix>
-Matrix empirical_covariance(const Matrix& formal, const Matrix& with_scores) {
+Matrix empirical_difference(const Matrix& formal, const Matrix& with_scores) {
   return (formal - with_scores) / kScoreWeight;
+}
+
+// C_e of some unknowns from C(0) and C(w). Where the observations hardly determine a direction, as the focal length of
+// images of a plane, C has too few right digits for the difference. This shows, because B' is not less than f rho / 2
+// times H in any direction, nor than H where that is less, and so is C_e of C. `ratio`: f rho; ratio C is taken then.
+// Rows of held unknowns are zero.
+template <typename Matrix>
+Matrix empirical_covariance(const Matrix& formal, const Matrix& with_scores, double ratio) {
+  constexpr double kOfBound = 0.5, kRounding = 1e-3;
+  Matrix empirical = empirical_difference(formal, with_scores);
+  Matrix above = empirical - kOfBound * std::min(1.0, kMeanShare * ratio) * formal;
+  for (Eigen::Index k = 0; k < above.rows(); ++k) above(k, k) += formal(k, k) > 0 ? kRounding * formal(k, k) : 1;
+  if (Eigen::LLT<Matrix>(above).info() != Eigen::Success) empirical = ratio * formal;
+  return empirical;
 }
 
 // The share of the images of a block that tell of errors in whole images: all of a small block, at least 50 in the mean

@@ -69,8 +69,10 @@ void MergeInMemory::final_scores() {
       runner_.scored_posterior([this](const RankTile& tile, const TileCovariance& of_scores) {
         const auto t = static_cast<std::size_t>(tile.tile);
         TileCovariance& empirical = empirical_[t] = covariances_[t];
-        const auto change = [](auto& formal, const auto& with_scores) {
-          for (std::size_t i = 0; i < formal.size(); ++i) formal[i] = empirical_covariance(formal[i], with_scores[i]);
+        const double ratio = cluster_weights(posterior_.spread).ratio;
+        const auto change = [&](auto& formal, const auto& with_scores) {
+          for (std::size_t i = 0; i < formal.size(); ++i)
+            formal[i] = empirical_covariance(formal[i], with_scores[i], ratio);
         };
         change(empirical.frames, of_scores.frames);
         change(empirical.aligned_frames, of_scores.aligned_frames);
@@ -78,10 +80,10 @@ void MergeInMemory::final_scores() {
         change(empirical.mounts, of_scores.mounts);
         for (std::size_t p = 0; p < empirical.points.size(); ++p)
           if (problems_[t].points[p].role != PointRole::kTie)
-            empirical.points[p] = empirical_covariance(empirical.points[p], of_scores.points[p]);
+            empirical.points[p] = empirical_covariance(empirical.points[p], of_scores.points[p], ratio);
       });
   for (std::size_t i = 0; i < scored.matrix.size(); ++i)
-    empirical_frames_.matrix[i] = empirical_covariance(empirical_frames_.matrix[i], scored.matrix[i]);
+    empirical_frames_.matrix[i] = empirical_difference(empirical_frames_.matrix[i], scored.matrix[i]);
 }
 
 const std::vector<TileStep>& MergeInMemory::steps() const {

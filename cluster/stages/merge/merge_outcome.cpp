@@ -115,11 +115,11 @@ BlockResult::Empirical read_covariances(const Job& job, const Tiles& tiles, cons
   return all;
 }
 
-// Replaces C(w) by the empirical covariance.
-void to_empirical(const BlockResult::Empirical& formal, BlockResult::Empirical& scored) {
-  const auto change = [](const auto& all, auto& of_scores) {
+// Replaces C(w) by the empirical covariance; `ratio` is that of the block in the mean, where digits are lost.
+void to_empirical(const BlockResult::Empirical& formal, double ratio, BlockResult::Empirical& scored) {
+  const auto change = [&](const auto& all, auto& of_scores) {
     auto from = all.begin();
-    for (auto& matrix : of_scores) matrix = empirical_covariance(*from++, matrix);
+    for (auto& matrix : of_scores) matrix = empirical_covariance(*from++, matrix, ratio);
   };
   change(formal.frame_covariance, scored.frame_covariance);
   change(formal.aligned_covariance, scored.aligned_covariance);
@@ -131,7 +131,7 @@ void to_empirical(const BlockResult::Empirical& formal, BlockResult::Empirical& 
   change(formal.control, scored.control);
   if (!formal.joint_covariance.frames.empty())
     scored.joint_covariance.matrix =
-        empirical_covariance(formal.joint_covariance.matrix, scored.joint_covariance.matrix);
+        empirical_covariance(formal.joint_covariance.matrix, scored.joint_covariance.matrix, ratio);
 }
 
 // Raises the empirical covariance of each camera to what whole images show of its parameters.
@@ -251,7 +251,7 @@ MergeOutcome make_outcome(const Job& job, Adjusted& adjusted, const Tiles& tiles
   if (job.settings.merge.empirical_sigmas) {
     outcome.empirical = read_covariances(job, tiles, outcome.state, scored_path);
     outcome.empirical.joint_covariance = joint_covariance(adjusted.scored_frames);
-    to_empirical(outcome.formal, outcome.empirical);
+    to_empirical(outcome.formal, cluster_weights(adjusted.posterior.spread).ratio, outcome.empirical);
     inflate_cameras(adjusted.posterior.spread, outcome);
   }
   const SubtreeSums& sums = adjusted.posterior.sums;

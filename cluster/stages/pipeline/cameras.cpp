@@ -204,7 +204,24 @@ void take_choice(CameraChoice choice, Camera& camera, Intrinsics& values) {
       values[static_cast<std::size_t>(p)] = camera.intrinsics[static_cast<std::size_t>(p)];
 }
 
-void take_found(const std::string& path, Block& block, BlockState& state, std::vector<BetterFocalLength>& better) {
+// Whether the focal length of the images differs by more from a stated one than focusing explains.
+bool differs(const Camera& camera, const CameraChoice& choice) {
+  constexpr double kFocusing = 0.05;
+  return std::abs(std::log(choice.focal_px / camera.intrinsics[kFocal])) > kFocusing;
+}
+
+// Of a focal length from a header or the project file that the images contradict, by less than one that cannot be
+// right.
+std::string contradiction_text(const Camera& camera, const CameraChoice& choice) {
+  return fmt::format(
+      "camera '{}': the images contradict the stated focal length of {:.0f} px: they give {:.0f} +- {:.0f} px; check "
+      "the "
+      "header or 'focal_px', and whether images were cropped or the lens zoomed",
+      camera.name, camera.intrinsics[kFocal], choice.focal_px, choice.focal_sigma_px);
+}
+
+void take_found(const std::string& path, Block& block, BlockState& state, std::vector<BetterFocalLength>& better,
+                std::vector<std::string>& notes) {
   std::ifstream in(path);
   std::int64_t number = 0;
   Found found;
@@ -214,7 +231,10 @@ void take_found(const std::string& path, Block& block, BlockState& state, std::v
          std::getline(in >> std::ws, choice.reason)) {
     const CameraIndex c(number);
     Camera& camera = block.cameras[c];
-    if (camera.choose && is_wrong(camera, choice)) better.push_back({c, choice.focal_px, choice.focal_sigma_px});
+    if (camera.choose && is_wrong(camera, choice))
+      better.push_back({c, choice.focal_px, choice.focal_sigma_px});
+    else if (camera.choose && choice.focal_contradicted && differs(camera, choice))
+      notes.push_back(contradiction_text(camera, choice));
     if (camera.choose)
       take_choice(choice, camera, state.cameras[c]);
     else
@@ -249,7 +269,10 @@ std::vector<BetterFocalLength> run_cameras(const Stage& stage, const Job& job, J
     throw AgreedError<ComputeError>("the parameters of the cameras could not be chosen: " +
                                     outcome.failures.front().reason);
   std::vector<BetterFocalLength> better;
-  for (const Unit& unit : units) take_found(job.store.verified_path(unit.name), block, state, better);
+  std::vector<std::string> notes;
+  for (const Unit& unit : units) take_found(job.store.verified_path(unit.name), block, state, better, notes);
+  if (better.empty())  // otherwise the block is oriented again
+    for (const std::string& note : notes) add_note(job, record, stage.name, note);
   for (const Camera& camera : block.cameras)
     if (asks_its_images(camera)) say(job, stage.name, fmt::format("camera '{}': {}", camera.name, camera.choice));
   return better;

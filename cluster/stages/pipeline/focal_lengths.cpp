@@ -154,30 +154,6 @@ std::vector<MatchedImages> match_coarsest(const Job& job, const Camera& camera, 
   return matched;
 }
 
-// Asks a sample of the pairs first where the focal length is known. In most blocks they agree with it.
-std::optional<FocalLength> estimate(const Job& job, const Camera& camera, const std::vector<ImagePair>& pairs) {
-  FocalLengthOptions options;
-  options.max_residual_px = job.settings.matching.max_residual_px;
-  options.threads = job.options.threads;
-  std::vector<MatchedImages> matched;  // the first pairs, which are asked again where the sample does not agree
-  const auto batch = [&](std::size_t first, std::size_t end) {
-    if (end > matched.size()) {
-      const auto next = std::span(pairs).subspan(matched.size(), end - matched.size());
-      std::ranges::move(match_coarsest(job, camera, next), std::back_inserter(matched));
-    }
-    return std::vector(matched.begin() + static_cast<std::ptrdiff_t>(first),
-                       matched.begin() + static_cast<std::ptrdiff_t>(end));
-  };
-  const auto ask = [&] { return focal_length_of(pairs.size(), batch, camera.width, camera.height, options); };
-  if (camera.focal_known) {
-    options.max_pairs = kSample;
-    auto found = ask();
-    if (!found || (found->asked == kSample && found->against(camera.intrinsics[kFocal]) < kAgreement)) return found;
-    options.max_pairs = FocalLengthOptions().max_pairs;
-  }
-  return ask();
-}
-
 // What the stage says of a camera.
 struct Finding {
   double focal_px = 0;  // with which the block starts; 0: the camera keeps its own
@@ -212,6 +188,38 @@ Finding judge(const FocalLength& found, const Camera& camera) {
     if (determined) finding.sigma = found.sigma();
   }
   return finding;
+}
+
+// Asks a sample of the pairs first where the focal length is known. In most blocks they agree with it. Where they do
+// not, they are asked again with each distortion of the lens that they allow, until they agree.
+std::optional<FocalLength> estimate(const Job& job, const Camera& camera, const std::vector<ImagePair>& pairs) {
+  FocalLengthOptions options;
+  options.max_residual_px = job.settings.matching.max_residual_px;
+  options.threads = job.options.threads;
+  std::vector<MatchedImages> matched;  // the first pairs, which are asked again where the sample does not agree
+  const auto batch = [&](std::size_t first, std::size_t end) {
+    if (end > matched.size()) {
+      const auto next = std::span(pairs).subspan(matched.size(), end - matched.size());
+      std::ranges::move(match_coarsest(job, camera, next), std::back_inserter(matched));
+    }
+    return std::vector(matched.begin() + static_cast<std::ptrdiff_t>(first),
+                       matched.begin() + static_cast<std::ptrdiff_t>(end));
+  };
+  const auto ask = [&] { return focal_length_of(pairs.size(), batch, camera.width, camera.height, options); };
+  const auto contradicted = [&](const FocalLength& found) { return judge(found, camera).focal_px > 0; };
+  if (camera.focal_known) {
+    options.max_pairs = kSample;
+    auto found = ask();
+    if (!found || (found->asked == kSample && found->against(camera.intrinsics[kFocal]) < kAgreement)) return found;
+    options.max_pairs = FocalLengthOptions().max_pairs;
+  }
+  const auto all = ask();
+  if (!camera.focal_known || !all || !contradicted(*all)) return all;
+  for (const double q : likely_distortions(pairs.size(), batch, camera.width, camera.height, options, *all)) {
+    options.distortion = q;
+    if (auto other = ask(); other && !contradicted(*other)) return other;
+  }
+  return all;
 }
 
 void write_finding(const std::string& path, const Finding& finding) {

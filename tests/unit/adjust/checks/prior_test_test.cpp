@@ -81,6 +81,21 @@ TEST(PriorTest, TheWorstIsSetAsideAndNotItsNeighbours) {
   EXPECT_EQ(aside_of(many), (std::vector{control(7), control(8)}));
 }
 
+// The loss ignores a position that is far off, but for a little. It is worth another adjustment of a small block.
+TEST(PriorTest, AFewPositionsArePulledByNone) {
+  const auto aside_of_positions = [](int count, std::int64_t is_control, double pull) {
+    PriorTests tests;
+    for (int i = 0; i < count; ++i) (is_control ? tests.control : tests.positions).add(1);
+    tests.far_off.push_back({{3, is_control}, 3, 50, pull});
+    return change_verdicts(tests, {}, {false, false}).aside.size();
+  };
+  EXPECT_EQ(aside_of_positions(18, 0, 0.1), 1U);
+  EXPECT_EQ(aside_of_positions(18, 0, 0.01), 0U);
+  EXPECT_EQ(aside_of_positions(60, 0, 0.1), 0U);
+  EXPECT_EQ(aside_of_positions(60, 0, 0.4), 1U);
+  EXPECT_EQ(aside_of_positions(18, 1, 0.1), 0U);
+}
+
 // P(chi > 4.5) = 1.5e-4 for three normal deviates.
 TEST(PriorTest, TheLimitGrowsWithTheNumberOfObservations) {
   std::vector<double> few(20, 1.5), many(200, 1.5);

@@ -184,8 +184,21 @@ TEST_F(EvaluateTest, FramesAreMatchedByName) {
   const Evaluation part = evaluate(result_, truth);
   EXPECT_EQ(part.frames, 498);
   EXPECT_EQ(part.frames_missing, 2);
-  for (auto& name : truth.names) name += "?";
+  for (auto& name : truth.names) name = "x" + name;
   EXPECT_THROW(evaluate(result_, truth), InputError);
+}
+
+// A list may write images without the folder in which they lie, as positions and control may.
+TEST_F(EvaluateTest, FramesAreMatchedByImagesInOtherFolders) {
+  PoseTable truth = pose_table(simulated_.block, simulated_.truth);
+  Block& block = result_.block;
+  std::vector<ImageIndex> first(block.frames.size());
+  for (ImageIndex i(0); block.images.contains(i); ++i.value) {
+    ImageIndex& of_frame = first[static_cast<std::size_t>(block.images[i].frame.value)];
+    if (!of_frame.valid()) of_frame = i;
+  }
+  for (std::size_t f = 0; f < first.size(); ++f) truth.names[f] = "campaign/" + block.name_of(first[f]);
+  EXPECT_EQ(evaluate(result_, truth).frames, 2000);
 }
 
 // The same truth about another origin: the figures stay.

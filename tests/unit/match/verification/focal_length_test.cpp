@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -74,12 +75,17 @@ MatchedBatch batches_of(const std::vector<MatchedImages>& pairs) {
   };
 }
 
-std::optional<FocalLength> found_in(const Scene& scene, std::uint64_t seed, std::size_t count = 12, int threads = 2) {
+std::vector<MatchedImages> pairs_in(const Scene& scene, std::uint64_t seed, std::size_t count) {
   std::vector<MatchedImages> pairs(count);
   for (std::size_t i = 0; i < count; ++i) {
     pairs[i].seed = seed * 1000 + i;
     pairs[i].pixels = simulate(scene, pairs[i].seed);
   }
+  return pairs;
+}
+
+std::optional<FocalLength> found_in(const Scene& scene, std::uint64_t seed, std::size_t count = 12, int threads = 2) {
+  const std::vector<MatchedImages> pairs = pairs_in(scene, seed, count);
   FocalLengthOptions options;
   options.threads = threads;
   return focal_length_of(pairs.size(), batches_of(pairs), kSensorWidth, kSensorHeight, options);
@@ -136,6 +142,32 @@ TEST(FocalLength, OfLensesThatDistort) {
 }
 
 // Parallel axes over flat ground: every focal length explains the matches.
+// Nearly flat ground from above does not tell the distortion either; a deep scene does.
+TEST(FocalLength, FlatGroundAllowsOtherDistortions) {
+  constexpr double kTrueQ = 0.02;
+  Scene flat, deep;
+  flat.relief = 0.05, flat.converging = false, flat.angles_rad = 0.03;
+  deep.relief = 1;
+  const double corner = 0.5 * std::hypot(kSensorWidth, kSensorHeight) / flat.focal_px;
+  flat.k1 = deep.k1 = -kTrueQ / (corner * corner);
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const auto others_of = [&](const Scene& scene) {
+      const std::vector<MatchedImages> pairs = pairs_in(scene, seed, 12);
+      const auto found = focal_length_of(pairs.size(), batches_of(pairs), kSensorWidth, kSensorHeight, {});
+      std::vector<double> all =
+          likely_distortions(pairs.size(), batches_of(pairs), kSensorWidth, kSensorHeight, {}, found.value());
+      EXPECT_TRUE(std::ranges::is_sorted(all, {}, [&](double q) { return std::abs(q - found->distortion); }));
+      all.push_back(found->distortion);
+      return all;
+    };
+    const auto near_truth = [&](double q) { return std::abs(q - kTrueQ) <= 0.03; };
+    EXPECT_TRUE(std::ranges::any_of(others_of(flat), near_truth)) << seed;
+    EXPECT_GE(others_of(flat).size(), 2U) << seed;
+    EXPECT_LE(others_of(deep).size(), 2U) << seed;
+    EXPECT_TRUE(std::ranges::any_of(others_of(deep), near_truth)) << seed;
+  }
+}
+
 TEST(FocalLength, IsNotToldByFlatGroundFromAbove) {
   Scene scene;
   scene.relief = 0;

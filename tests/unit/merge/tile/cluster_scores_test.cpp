@@ -134,5 +134,21 @@ TEST(ClusterScores, GiveTheSandwichOfTheDenseSystem) {
   }
 }
 
+// C and C(w) of an unknown that is hardly determined differ by their errors. Its sigma is that of the mean then.
+TEST(ClusterScores, LostDigitsDoNotMakeNegativeSigmas) {
+  constexpr double kRatio = 3;
+  const Eigen::Matrix3d formal = Eigen::Vector3d(1, 4, 0).asDiagonal();  // the third is held
+  const Eigen::Matrix3d twice = formal - 2 * kScoreWeight * formal;
+  EXPECT_TRUE(empirical_covariance(formal, twice, kRatio).isApprox(2 * formal, 1e-9));
+  for (const double error : {1e-3, -1e-3}) {
+    Eigen::Matrix3d lost = twice;
+    lost(0, 1) = lost(1, 0) = error;  // a correlation of more than one
+    EXPECT_TRUE(empirical_covariance(formal, lost, kRatio).isApprox(kRatio * formal, 1e-12));
+  }
+  Eigen::Matrix3d larger = twice;
+  larger(1, 1) = formal(1, 1) * (1 + 1e-3);
+  EXPECT_TRUE(empirical_covariance(formal, larger, kRatio).isApprox(kRatio * formal, 1e-12));
+}
+
 }  // namespace
 }  // namespace megablock
