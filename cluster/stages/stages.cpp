@@ -95,17 +95,22 @@ void orientation(const Stage& stage, const Job& job, JobRecord& record, StageRes
 // Positions hold a block together although pairs are lost or turned. The halves of a split test begin with the focal
 // length of their job.
 void cameras(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {
-  const auto better = run_cameras(stage, job, record, results.tiles, results.oriented.state, results.own.block);
+  const CameraFindings findings =
+      run_cameras(stage, job, record, results.tiles, results.oriented.state, results.own.block);
   return_freed_memory();
-  if (job.options.half.half != Half::kNone || !lacks_positions(job.block)) return;
-  for (const BetterFocalLength& found : better) {
-    if (!keep_focal_length(*find_stage(kFocalLengthStage), job, found.camera, found.focal_px, found.sigma_px)) continue;
+  const bool may_begin_again = job.options.half.half == Half::kNone && lacks_positions(job.block);
+  for (const BetterFocalLength& found : findings.better) {
+    if (!may_begin_again ||
+        !keep_focal_length(*find_stage(kFocalLengthStage), job, found.camera, found.focal_px, found.sigma_px))
+      continue;
     results.begins_again = true;
     say(job, stage.name,
         fmt::format("camera '{}': the oriented block gives a focal length of {:.0f} px; the run begins again with it, "
                     "since pairs may have been lost or turned by the wrong one",
                     job.block.cameras[found.camera].name, found.focal_px));
   }
+  if (results.begins_again) return;
+  for (const std::string& note : findings.contradictions) add_note(job, record, stage.name, note);
 }
 
 void adjustment(const Stage& stage, const Job& job, JobRecord& record, StageResults& results) {

@@ -220,8 +220,7 @@ std::string contradiction_text(const Camera& camera, const CameraChoice& choice)
       camera.name, camera.intrinsics[kFocal], choice.focal_px, choice.focal_sigma_px);
 }
 
-void take_found(const std::string& path, Block& block, BlockState& state, std::vector<BetterFocalLength>& better,
-                std::vector<std::string>& notes) {
+void take_found(const std::string& path, Block& block, BlockState& state, CameraFindings& findings) {
   std::ifstream in(path);
   std::int64_t number = 0;
   Found found;
@@ -232,9 +231,9 @@ void take_found(const std::string& path, Block& block, BlockState& state, std::v
     const CameraIndex c(number);
     Camera& camera = block.cameras[c];
     if (camera.choose && is_wrong(camera, choice))
-      better.push_back({c, choice.focal_px, choice.focal_sigma_px});
-    else if (camera.choose && choice.focal_contradicted && differs(camera, choice))
-      notes.push_back(contradiction_text(camera, choice));
+      findings.better.push_back({c, choice.focal_px, choice.focal_sigma_px});
+    if (camera.choose && choice.focal_contradicted && differs(camera, choice))
+      findings.contradictions.push_back(contradiction_text(camera, choice));
     if (camera.choose)
       take_choice(choice, camera, state.cameras[c]);
     else
@@ -245,8 +244,8 @@ void take_found(const std::string& path, Block& block, BlockState& state, std::v
 
 }  // namespace
 
-std::vector<BetterFocalLength> run_cameras(const Stage& stage, const Job& job, JobRecord& record, const Tiles& tiles,
-                                           BlockState& state, Block& block) {
+CameraFindings run_cameras(const Stage& stage, const Job& job, JobRecord& record, const Tiles& tiles, BlockState& state,
+                           Block& block) {
   std::vector<Unit> units;
   const std::uint64_t inputs = inputs_hash(stage, job, state);
   for (RigIndex rig(0); job.block.rigs.contains(rig); ++rig.value) {
@@ -268,14 +267,11 @@ std::vector<BetterFocalLength> run_cameras(const Stage& stage, const Job& job, J
   if (!outcome.failures.empty())
     throw AgreedError<ComputeError>("the parameters of the cameras could not be chosen: " +
                                     outcome.failures.front().reason);
-  std::vector<BetterFocalLength> better;
-  std::vector<std::string> notes;
-  for (const Unit& unit : units) take_found(job.store.verified_path(unit.name), block, state, better, notes);
-  if (better.empty())  // otherwise the block is oriented again
-    for (const std::string& note : notes) add_note(job, record, stage.name, note);
+  CameraFindings findings;
+  for (const Unit& unit : units) take_found(job.store.verified_path(unit.name), block, state, findings);
   for (const Camera& camera : block.cameras)
     if (asks_its_images(camera)) say(job, stage.name, fmt::format("camera '{}': {}", camera.name, camera.choice));
-  return better;
+  return findings;
 }
 
 }  // namespace megablock

@@ -2,6 +2,7 @@
 // estimated, chosen from a sample of the oriented block (merge/camera/determined_parameters.h).
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "cluster/job/job.h"
@@ -17,10 +18,14 @@ struct BetterFocalLength {
   double focal_px = 0, sigma_px = 0;
 };
 
+struct CameraFindings {
+  std::vector<BetterFocalLength> better;    // differ from those of the matching by more than a tenth
+  std::vector<std::string> contradictions;  // of stated focal lengths, as notes; not for a run that begins again
+};
+
 // Collective. Sets the prior sigmas of the cameras of `block` (that of the job) by the choice, and puts held parameters
-// of the state back to their start values. Does nothing where no camera asks for it. Returns the focal lengths
-// that differ from those of the matching by more than a tenth.
-std::vector<BetterFocalLength> run_cameras(const Stage& stage, const Job& job, JobRecord& record, const Tiles& tiles,
-                                           BlockState& state, Block& block);
+// of the state back to their start values. Does nothing where no camera asks for it.
+CameraFindings run_cameras(const Stage& stage, const Job& job, JobRecord& record, const Tiles& tiles, BlockState& state,
+                           Block& block);
 
 }  // namespace megablock
