@@ -4,7 +4,8 @@
 //     first_centres()    directions and lengths of the baselines, and centres from them, up to a similarity
 //     check_verticals()  wrong verticals are set aside; the first two steps are repeated with the others
 //     to_ground()        a similarity to the observed positions; the centres are solved once more with them
-//     shape_by_images()  instead of it where hardly any position fits: the steps below without positions, then the
+//     shape_by_images()  instead of it where fewer than half of the positions fit: the steps below without positions,
+//     then the
 //                        similarity
 //     position()         centres and points from the rays alone, rotations held
 //     adjust()           three adjustments of everything, with limits of 25, 10 and 4 px
@@ -18,6 +19,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "adjust/orientation/graph_verticals.h"
 #include "adjust/orientation/orientation_parts.h"
 #include "adjust/orientation/steps/baselines.h"
 #include "adjust/orientation/steps/coarse_adjustment.h"
@@ -27,10 +29,8 @@
 #include "adjust/orientation/steps/resection.h"
 #include "adjust/orientation/steps/rotation_averaging.h"
 #include "adjust/orientation/vertical_check.h"
-#include "adjust/terms/vertical_terms.h"
 #include "geometry/numbers/angles.h"
 #include "io/base/error.h"
-#include "io/project/inputs/verticals.h"
 
 namespace megablock {
 
@@ -127,7 +127,7 @@ class Orientation {
     }
     const AveragedRotations averaged =
         average_rotations(graph_.frame_count(), relative, priors, options_.max_rotation_error_deg * kDegree,
-                          use_verticals_ ? known_verticals() : std::vector<KnownVertical>());
+                          use_verticals_ ? known_verticals(block_, graph_, values_) : std::vector<KnownVertical>());
     usable_ = averaged.kept;
     dropped_edges_ = std::count(usable_.begin(), usable_.end(), 0);
     rotations_ = averaged.rotation;
@@ -135,44 +135,15 @@ class Orientation {
       if (rotations_[f]) reasons_[f] = "no baseline to other images could be measured";
   }
 
-  // The verticals in the axes of the frames. Their sigmas include the errors of the cameras, because rotation averaging
-  // does not estimate these.
-  std::vector<KnownVertical> known_verticals() const {
-    const GroundVertical ground(block_.ground);
-    std::vector<KnownVertical> verticals;
-    for (const auto& image : graph_.images) {
-      if (image.vertical == nullptr) continue;
-      const auto& frame = graph_.frames[row(image.frame)];
-      const AxisDirection down = whole_error(*image.vertical, block_.cameras[graph_.cameras[row(image.camera)]],
-                                             values_.cameras[row(image.camera)]);
-      verticals.push_back({image.frame, image.mount.rotation.conjugate() * down.direction,
-                           ground.down(frame.position ? frame.position->position : Eigen::Vector3d::Zero()),
-                           std::max(1e-4, std::sqrt(down.covariance.trace() / 2))});
-    }
-    return verticals;
-  }
-
   // Sets aside the verticals that contradict the rotations averaged without them, the positions or the attitudes.
   // Returns whether any are left.
   // The verticals are judged by rotations that were averaged without them; verticals that confirm each other through
   // the average would judge themselves.
   bool check_verticals() {
-    std::vector<SeenDown> seen;
-    std::vector<std::size_t> images;
-    for (std::size_t i = 0; i < graph_.images.size(); ++i) {
-      const auto& image = graph_.images[i];
-      if (image.vertical == nullptr) continue;
-      const Camera& camera = block_.cameras[graph_.cameras[row(image.camera)]];
-      const Eigen::Matrix3d to_frame = image.mount.rotation.conjugate().toRotationMatrix();
-      seen.push_back({image.frame, image.camera,
-                      to_frame * whole_error(*image.vertical, camera, values_.cameras[row(image.camera)]).direction,
-                      to_frame * image.vertical->covariance * to_frame.transpose(),
-                      to_frame * camera_error(*image.vertical, camera)});
-      images.push_back(i);
-    }
+    const auto [seen, images] = seen_verticals(block_, graph_, values_);
     if (seen.empty()) return false;
-    const std::vector<VerticalVerdict> verdicts =
-        judge_verticals(rotations_, relative_rotations(), usable_, seen, known_down());
+    const std::vector<VerticalVerdict> verdicts = judge_verticals(rotations_, relative_rotations(), usable_, seen,
+                                                                  known_down(block_, graph_, values_, known_angles_));
     for (std::size_t v = 0; v < verdicts.size(); ++v) {
       if (verdicts[v] == VerticalVerdict::kBelieved) continue;
       auto& image = graph_.images[images[v]];
@@ -181,23 +152,6 @@ class Orientation {
     }
     known_angles_ = known_angles(graph_);
     return aside_.size() < seen.size();
-  }
-
-  // The direction of down in the axes of the averaged rotations, if attitudes or positions determine it.
-  std::optional<AxisDirection> known_down() const {
-    const GroundVertical ground(block_.ground);
-    const Eigen::Vector3d down = ground.down(Eigen::Vector3d::Zero());
-    if (known_angles_ != GroundAngles::kAll) return down_by_positions(graph_, values_, down);
-    constexpr double kMounting = 2 * kDegree;  // of the attitude sensors relative to the cameras
-    double variance = 0, count = 0;
-    for (const auto& frame : graph_.frames) {
-      if (!frame.given && !frame.attitude) continue;
-      // The mean of n attitudes has their mean variance over n. The mounting is the same for all of them, and is not
-      // averaged out.
-      if (!frame.given) variance += frame.attitude->sigma_rad.squaredNorm();
-      ++count;
-    }
-    return AxisDirection{down, (kMounting * kMounting + variance / count) * Eigen::Matrix3d::Identity()};
   }
 
   void first_centres() {
