@@ -15,6 +15,7 @@
 #include "cluster/job/work_queue.h"
 #include "cluster/mpi/collective.h"
 #include "cluster/stages/common/block_hash.h"
+#include "cluster/stages/pipeline/focal_lengths.h"
 #include "io/base/error.h"
 #include "io/base/hash.h"
 #include "io/project/inputs/camera_priors.h"
@@ -210,14 +211,13 @@ bool differs(const Camera& camera, const CameraChoice& choice) {
   return std::abs(std::log(choice.focal_px / camera.intrinsics[kFocal])) > kFocusing;
 }
 
-// Of a focal length from a header or the project file that the images contradict, by less than one that cannot be
-// right.
+// Of a focal length from a header or the project file. One that is_wrong() gets the words of the stage focal_lengths.
 std::string contradiction_text(const Camera& camera, const CameraChoice& choice) {
   return fmt::format(
-      "camera '{}': the images contradict the stated focal length of {:.0f} px: they give {:.0f} +- {:.0f} px; check "
-      "the "
-      "header or 'focal_px', and whether images were cropped or the lens zoomed",
-      camera.name, camera.intrinsics[kFocal], choice.focal_px, choice.focal_sigma_px);
+      "camera '{}': the focal length of {} {}: the oriented block gives {:.0f} +- {:.0f} px; check the header "
+      "or 'focal_px', and whether images were cropped or the lens zoomed",
+      camera.name, focal_length_text(camera, camera.intrinsics[kFocal]),
+      is_wrong(camera, choice) ? "cannot be right" : "does not fit the images", choice.focal_px, choice.focal_sigma_px);
 }
 
 void take_found(const std::string& path, Block& block, BlockState& state, CameraFindings& findings) {

@@ -238,20 +238,15 @@ Finding read_finding(const std::string& path) {
   return finding;
 }
 
-std::string text_of(const Camera& camera, double focal_px) {
-  return fmt::format("{:.0f} px ({:.0f} mm of the 35 mm format)", focal_px,
-                     36 * focal_px / std::max(camera.width, camera.height));
-}
-
 // "640 px (29 mm of the 35 mm format) +- 1.2 % by 40 pairs of images".
 std::string source_of(const Finding& finding, const Camera& camera) {
   if (finding.block_focal_px > 0)
-    return fmt::format("{} +- {:.2g} % by a first orientation of the block", text_of(camera, finding.block_focal_px),
-                       100 * finding.block_sigma);
+    return fmt::format("{} +- {:.2g} % by a first orientation of the block",
+                       focal_length_text(camera, finding.block_focal_px), 100 * finding.block_sigma);
   if (finding.sigma > 0)
-    return fmt::format("{} +- {:.1f} % by {} pairs of images", text_of(camera, finding.focal_px), 100 * finding.sigma,
-                       finding.asked);
-  return fmt::format("about {}, which few pairs of images contradict", text_of(camera, finding.focal_px));
+    return fmt::format("{} +- {:.1f} % by {} pairs of images", focal_length_text(camera, finding.focal_px),
+                       100 * finding.sigma, finding.asked);
+  return fmt::format("about {}, which few pairs of images contradict", focal_length_text(camera, finding.focal_px));
 }
 
 std::string note_of(const Finding& finding, const Camera& camera) {
@@ -264,7 +259,7 @@ std::string note_of(const Finding& finding, const Camera& camera) {
   return fmt::format(
       "camera '{}': the focal length of {} cannot be right: {}; the block starts with {}; check the header, and a lens "
       "or a crop of which it does not know; 'calibrate: true' keeps it",
-      camera.name, text_of(camera, camera.intrinsics[kFocal]), against, found);
+      camera.name, focal_length_text(camera, camera.intrinsics[kFocal]), against, found);
 }
 
 // Takes what was found. Returns what to note; empty: nothing.
@@ -288,6 +283,11 @@ std::string unit_of(const Stage& stage, CameraIndex camera) {
 }
 
 }  // namespace
+
+std::string focal_length_text(const Camera& camera, double focal_px) {
+  return fmt::format("{:.0f} px ({:.0f} mm of the 35 mm format)", focal_px,
+                     36 * focal_px / std::max(camera.width, camera.height));
+}
 
 void run_focal_lengths(const Stage& stage, const Job& job, JobRecord& record, const FeatureStage& features,
                        const CandidateGraph& graph, Block& block) {

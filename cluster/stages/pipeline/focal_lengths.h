@@ -6,6 +6,8 @@
 // better focal length, and the run begins again with it.
 #pragma once
 
+#include <string>
+
 #include "cluster/job/job.h"
 #include "cluster/job/job_record.h"
 #include "cluster/job/stage.h"
@@ -23,5 +25,8 @@ void run_focal_lengths(const Stage& stage, const Job& job, JobRecord& record, co
 // later runs. Returns false, and keeps nothing, where the stage did not ask for the camera or has kept one before: a
 // run begins again once at most for each camera.
 bool keep_focal_length(const Stage& stage, const Job& job, CameraIndex camera, double focal_px, double sigma_px);
+
+// "640 px (29 mm of the 35 mm format)".
+std::string focal_length_text(const Camera& camera, double focal_px);
 
 }  // namespace megablock

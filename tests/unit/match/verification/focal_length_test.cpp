@@ -141,7 +141,6 @@ TEST(FocalLength, OfLensesThatDistort) {
   expect_found(cushion);
 }
 
-// Parallel axes over flat ground: every focal length explains the matches.
 // Nearly flat ground from above does not tell the distortion either; a deep scene does.
 TEST(FocalLength, FlatGroundAllowsOtherDistortions) {
   constexpr double kTrueQ = 0.02;
@@ -168,6 +167,7 @@ TEST(FocalLength, FlatGroundAllowsOtherDistortions) {
   }
 }
 
+// Parallel axes over flat ground: every focal length explains the matches.
 TEST(FocalLength, IsNotToldByFlatGroundFromAbove) {
   Scene scene;
   scene.relief = 0;
