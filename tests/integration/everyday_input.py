@@ -11,6 +11,7 @@ import unittest
 import h5py
 import numpy
 import pictures
+from PIL import Image
 from program import FAILED_UNITS, megablock, status
 from small_block import CopyOfTheBlock, setUpModule, simulate, tearDownModule, work
 
@@ -27,6 +28,21 @@ class EverydayInput(CopyOfTheBlock):
     def assert_all_oriented(self, images=12, oriented=None):
         state = status(self.job)
         self.assertEqual((state["images"], state["oriented"]), (images, oriented or images))
+
+    def write_positions(self, positions, project=""):
+        """A list of positions in metres, one row for each image in the order of the names, sigma 0.05 m."""
+        names = sorted(file.name for file in self.images.iterdir())
+        rows = [f"{name},{x},{y},{z}" for name, (x, y, z) in zip(names, positions, strict=True)]
+        (self.folder / "positions.csv").write_text("\n".join(["image,x,y,z", *rows]))
+        self.write_project("positions: {file: positions.csv, crs: local}\n"
+                           "gps: {sigma_horizontal_m: 0.05, sigma_vertical_m: 0.05}\n" + project)
+
+    def true_positions(self):
+        with h5py.File(self.folder / "truth.h5") as truth:
+            return truth["frames/centre"][:]
+
+    def errors(self):
+        return json.loads(megablock("evaluate", self.job, self.folder / "truth.h5", "--json"))
 
     def test_leftovers_of_systems_are_no_images(self):
         for file in self.files()[:3]:
@@ -132,22 +148,15 @@ class EverydayInput(CopyOfTheBlock):
     def test_positions_of_two_flights_get_a_shift(self):
         simulate("flights", 12, 480, 360)
         self.use("flights")
-        random = numpy.random.default_rng(5)
-        with h5py.File(self.folder / "truth.h5") as truth:
-            positions = truth["frames/centre"][:] + 0.05 * random.standard_normal((12, 3))
+        positions = self.true_positions() + 0.05 * numpy.random.default_rng(5).standard_normal((12, 3))
         positions[7:, 2] += 5
-        names = sorted(file.name for file in self.files())
-        rows = [f"{name},{x},{y},{z}" for name, (x, y, z) in zip(names, positions)]
-        (self.folder / "positions.csv").write_text("\n".join(["image,x,y,z", *rows]))
-        project = ("positions: {file: positions.csv, crs: local}\n"
-                   "gps: {sigma_horizontal_m: 0.05, sigma_vertical_m: 0.05}\n")
         for more in ("", "orientation: {shift_positions: false}\n"):
             with self.subTest(project=more):
-                self.write_project(project + more)
+                self.write_positions(positions, more)
                 self.run_job()
                 self.assert_all_oriented()
                 state = status(self.job)
-                errors = json.loads(megablock("evaluate", self.job, self.folder / "truth.h5", "--json"))
+                errors = self.errors()
                 if more:
                     self.assertGreater(errors["position_rms_m"], 0.3)
                     continue
@@ -156,6 +165,59 @@ class EverydayInput(CopyOfTheBlock):
                 found = re.search(r"in the adjusted block the positions of \S+ and 4 more lie ([0-9.]+) m above their places", notes)
                 self.assertLess(abs(float(found[1]) - 5), 0.2, notes)
                 self.assertLess(errors["position_rms_m"], 0.15)
+
+    def test_two_gross_positions_are_named_and_move_nothing(self):
+        positions = self.true_positions() + 0.05 * numpy.random.default_rng(3).standard_normal((12, 3))
+        self.write_positions(positions)
+        self.run_job()
+        right = self.errors()
+        positions[4, 0] += 248
+        positions[9, 2] -= 178
+        self.write_positions(positions)
+        self.run_job()
+        self.assert_all_oriented()
+        said = " ".join(status(self.job)["remarks"])
+        self.assertRegex(said, "2 of 12 positions differ .* f000004.jpg by 24[78] m, f000009.jpg by 17[789] m")
+        self.assertLess(abs(self.errors()["position_rms_m"] - right["position_rms_m"]), 0.03)
+        self.assertLess(self.errors()["position_max_m"], 0.15)
+
+    def test_two_images_without_headers(self):
+        for file in self.files()[2:]:
+            file.unlink()
+        for file in self.files():
+            pictures.strip_exif(file)
+        self.write_project("")
+        self.run_job()
+        self.assert_all_oriented(2)
+        self.assertIn("The datum is free", " ".join(status(self.job)["remarks"]))
+        with h5py.File(self.job / "result/block.h5") as result:
+            self.assertRegex(result["cameras/choice"].asstr()[0], "estimated: f .*held: cx, cy ")
+            sigma_px = result["cameras/covariance"][0, 0, 0] ** 0.5
+        self.assertLess(abs(self.focal_px() - 375), 3 * sigma_px)
+
+    def test_images_of_other_kinds_among_others(self):
+        positions = self.true_positions()
+        for file, mode in zip(self.files(), ("L", "CMYK", "RGBA", "P")):
+            image = Image.open(file).convert(mode)
+            file.unlink()
+            image.save(file if mode in ("L", "CMYK") else file.with_suffix(".png"))
+        self.write_positions(positions)
+        self.run_job()
+        self.assert_all_oriented()
+        self.assertLess(self.errors()["position_rms_m"], 0.1)
+
+    def test_a_hot_pixel_among_few_grey_values_of_16_bits(self):
+        positions = self.true_positions()
+        for file in self.files():
+            grey = numpy.asarray(Image.open(file).convert("L")).astype(numpy.uint16) * 8
+            grey[100, 200] = 65535
+            Image.fromarray(grey).save(file.with_suffix(".tif"))
+            file.unlink()
+        self.write_positions(positions)
+        self.run_job()
+        self.assert_all_oriented()
+        self.assertLess(self.errors()["position_rms_m"], 0.1)
+        self.assertLess(abs(self.focal_px() / 375 - 1), 0.01)
 
     def focal_px(self):
         with h5py.File(self.job / "result/block.h5") as result:
