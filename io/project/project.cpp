@@ -14,6 +14,7 @@
 #include "io/project/inputs/control_file.h"
 #include "io/project/inputs/frame_measurements_file.h"
 #include "io/project/inputs/lines.h"
+#include "io/project/inputs/relative_poses_file.h"
 #include "io/project/inputs/verticals.h"
 #include "io/project/project_sections.h"
 #include "io/store/hdf5/hdf5_file.h"
@@ -156,11 +157,14 @@ void read_block_sections(YamlReader& top, Project& project, const std::vector<Se
 
   const auto poses = read_poses(top);
   const auto control = read_control(top);
-  std::vector<Geodetic> others = poses ? poses->positions() : std::vector<Geodetic>();
+  const Trajectories trajectories = read_trajectories(top, scanned, names_left_out(project), project);
+  std::vector<Geodetic> others = trajectories.places();
+  if (poses && others.empty()) others = poses->positions();
   if (control && others.empty()) others = geodetic_positions(*control);
   const bool from_files = read_position_files(top, scanned, project);
-  read_positions(top, scanned, from_files, others, ground, project);
-  read_attitudes(top, scanned, project);
+  const Eigen::Vector3d lever_arm = read_positions(top, scanned, from_files, trajectories, others, ground, project);
+  read_attitudes(top, scanned, trajectories, project);
+  trajectories.set_starts(lever_arm, project.block);
   if (poses) set_given_poses(*poses, names_left_out(project), project.block, project.warnings);
   if (control) {
     add_control(*control, names_left_out(project), project.block, project.warnings);
@@ -168,6 +172,12 @@ void read_block_sections(YamlReader& top, Project& project, const std::vector<Se
   }
   if (const auto lines = top.existing_file("lines"))
     read_lines(*lines, names_left_out(project), project.block, project.warnings);
+  if (const auto relative = top.existing_file("relative_poses")) {
+    if (std::ranges::any_of(trajectories.sources, [](const auto& source) { return source.relative.has_value(); }))
+      throw InputError(top.where("relative_poses") +
+                       ": 'relative_poses' and 'relative' of 'trajectory' state the same thing; take one of them out");
+    read_relative_poses(*relative, names_left_out(project), project.block, project.warnings);
+  }
   for (const FrameMeasurementType& type : frame_measurement_types())
     if (const auto file = top.existing_file(type.key))
       read_frame_measurements(type, *file, names_left_out(project), project.block, project.warnings);

@@ -7,11 +7,13 @@
 //                  then the guess of 1.2 times the larger side
 //     mounts       `calibration`, then the file of rig cameras
 //     mask         the key `mask` of the camera, then the folder `masks`
-//     position     `positions`, then the image headers; of a rig, that of its first image with one. Its sigmas: `gps`,
-//                  then the file, its section or the header, then DOP or the default
-//     attitude     `positions`, then the image headers
-//     ground       that of the running job, then `origin`, then the median of the positions, of `poses`, of `control`
-//     given pose   the row of the frame, then that of its first image in the file
+//     position     `trajectory`, then `positions`, then the image headers; of a rig, that of its first image with one.
+//                  Its sigmas: `gps`, then the section, the file or the header, then DOP or the default
+//     attitude     `trajectory`, then `positions`, then the image headers
+//     ground       that of the running job, then `origin`, then the median of the positions, of `trajectory`, of
+//                  `poses`, of `control`
+//     given pose   `poses` (the row of the frame, then that of its first image in the file), then `trajectory`
+//     relative     `relative_poses` and `trajectory`, then a given block
 //     control      the keys beside `control: file`, then the columns of the file, then the defaults
 #pragma once
 

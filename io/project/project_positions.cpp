@@ -1,13 +1,5 @@
 // Reads the section `positions` of the project file: files of positions (and attitudes) of images that other programs
 // wrote. Their values take the place of those in the image headers, so that everything behind treats both alike.
-//
-// With P(place) the WGS84 position of a row and E its axes east, north, up, a row with the offset o of the camera from
-// the antenna gives the position P + E' o. Angles of the kinds kBody and kGimbal refer to true north. Omega, phi and
-// kappa refer to the axes of the grid, in which true north has the bearing g (the convergence of the meridians):
-//
-//     R_own = R_grid M,    M = [cos g, sin g; -sin g, cos g] in the plane,
-//
-// because M turns the axes east, north at the image into those of the grid.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -17,15 +9,13 @@
 
 #include "geometry/numbers/angles.h"
 #include "geometry/numbers/median.h"
-#include "geometry/transform/body_attitude.h"
-#include "geometry/transform/rotation.h"
 #include "io/base/error.h"
 #include "io/project/inputs/image_lookup.h"
 #include "io/project/positions/exposures.h"
-#include "io/project/positions/position_columns.h"
-#include "io/project/positions/position_fields.h"
 #include "io/project/positions/position_formats.h"
+#include "io/project/positions/row_pose.h"
 #include "io/project/project_sections.h"
+#include "io/project/table_source.h"
 
 namespace megablock {
 
@@ -33,15 +23,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr double kTimeSigma = 0.3;     // s, of times in whole seconds
 constexpr double kFarFromHeader = 50;  // m; single GNSS positions and rounded coordinates are nearer
 
-// One file with what the project says of it.
-struct PositionSource {
-  std::string path, exposures, folder, where;
-  PositionOptions options;
-  std::optional<double> sigma_horizontal, sigma_vertical;
-  double time_offset_s = kNoNumber;
+struct PositionSource : TableSource {
+  std::string exposures;
 };
 
 AngleKind angle_kind(const std::string& text, const std::string& where) {
@@ -53,61 +38,11 @@ AngleKind angle_kind(const std::string& text, const std::string& where) {
 
 PositionSource read_source(YamlReader reader) {
   PositionSource source;
-  source.where = reader.where();
-  const auto file = reader.existing_file("file");
-  if (!file)
-    throw InputError(reader.where() + ": key 'file' is missing in 'positions'; write 'positions: {file: geo.txt}'");
-  source.path = *file;
+  read_table_source(reader, "positions", source);
   source.exposures = reader.existing_file("exposures").value_or("");
-  source.folder = reader.text("images").value_or("");
-  source.options.format = reader.text("format").value_or("");
-  source.options.crs = reader.text("crs").value_or("");
   if (const auto angles = reader.text("angles")) source.options.angles = angle_kind(*angles, reader.where("angles"));
-  if (auto columns = reader.mapping("columns"))
-    for (const std::string& field : columns->keys()) {
-      if (!PositionColumns::is_field(field))
-        throw InputError(columns->where(field) + ": columns: '" + field +
-                         "' is not one of: " + PositionColumns::fields());
-      source.options.columns[field] = *columns->text(field);
-    }
-  source.sigma_horizontal = reader.number("sigma_horizontal_m", kSigmaMetres);
-  source.sigma_vertical = reader.number("sigma_vertical_m", kSigmaMetres);
-  source.time_offset_s = reader.number("time_offset_s").value_or(kNoNumber);
   reader.finish();
   return source;
-}
-
-std::vector<PositionSource> read_sources(YamlReader& top) {
-  const auto node = top.node("positions");
-  std::vector<PositionSource> sources;
-  const auto add = [&](const YAML::Node& item) {
-    if (item.IsMap()) {
-      sources.push_back(read_source(YamlReader(item, top.file(), "positions")));
-      return;
-    }
-    PositionSource source;
-    source.where = top.where("positions");
-    if (!item.IsScalar())
-      throw InputError(source.where + ": positions must be a file, a mapping with 'file', or a list of these");
-    source.path = top.absolute(item.Scalar());
-    if (!fs::is_regular_file(source.path))
-      throw InputError(source.where + ": positions: file '" + item.Scalar() + "' does not exist; check the path");
-    sources.push_back(source);
-  };
-  if (node && node->IsSequence())
-    for (const YAML::Node& item : *node) add(item);
-  else if (node)
-    add(*node);
-  return sources;
-}
-
-ImageTime time_of_image(const ScannedImage& image) {
-  const ImageHeader& header = image.header;
-  ImageTime time{image.name, kNoNumber, header.time_s};
-  double utc = header.gps_time_s;
-  if (std::isnan(utc)) utc = header.time_s - header.zone_s;
-  time.gps_s = utc + leap_seconds(utc);
-  return time;
 }
 
 // The images that exposures may belong to: those of the folder that the project names, else those beside the file if
@@ -123,24 +58,6 @@ std::vector<std::size_t> images_of_source(const PositionSource& source, const st
   if (images.empty())
     throw InputError(source.where + ": images: the block has no image in folder '" + source.folder + "'");
   return source.folder.empty() && !beside.empty() ? beside : images;
-}
-
-// Metres per second along the path at each time, from the positions half a second before and after; 0 off the path.
-std::vector<double> speeds_at(const PositionTable& path, const std::vector<double>& times, bool degrees) {
-  std::vector<double> before = times, after = times, speeds;
-  for (double& time : before) time -= 0.5;
-  for (double& time : after) time += 0.5;
-  const std::vector<PositionTable::Row> from = interpolate(path, before), to = interpolate(path, after);
-  constexpr double kMetresPerDegree = 111320;  // along meridians and along the equator, to one per cent
-  for (std::size_t i = 0; i < times.size(); ++i) {
-    Eigen::Vector3d step = to[i].place - from[i].place;
-    if (degrees) {
-      step.x() *= kMetresPerDegree * std::cos(from[i].place.y() * kDegree);
-      step.y() *= kMetresPerDegree;
-    }
-    speeds.push_back(step.allFinite() ? step.norm() : 0);
-  }
-  return speeds;
 }
 
 // Gives every row its image.
@@ -170,6 +87,8 @@ class RowsOfImages {
       by_name(table, lookup);
     else if (table.kind == PositionTable::Kind::kExposures)
       by_exposure(table, file);
+    else if (table.kind == PositionTable::Kind::kOrdered)
+      by_order(table);
     else
       by_time(table);
     for (const std::string& note : table.notes) project_.warnings.push_back(note);
@@ -230,26 +149,21 @@ class RowsOfImages {
       if (rows[i] >= 0) rows_[images[i]] = table.rows[static_cast<std::size_t>(rows[i])];
   }
 
+  void by_order(const PositionTable& table) {
+    const std::vector<std::size_t> images = images_of_source(source_, source_.path, scanned_);
+    if (images.size() != table.rows.size())
+      throw InputError(
+          fmt::format("{}: has {} poses for {} images; a file without names needs one for each, in the "
+                      "order of their names",
+                      source_.path, table.rows.size(), images.size()));
+    for (std::size_t i = 0; i < images.size(); ++i) rows_[images[i]] = table.rows[i];
+  }
+
   void by_time(PositionTable& table) {
     const std::vector<std::size_t> images = images_of_source(source_, source_.path, scanned_);
-    const std::vector<double> times =
-        times_on_path(table, times_of(images), source_.time_offset_s, source_.path, table.notes);
-    const std::vector<PositionTable::Row> places = interpolate(table, times);
-    const bool whole =
-        std::ranges::all_of(times, [](double time) { return std::isnan(time) || time == std::floor(time); });
-    const bool degrees = crs_ == "WGS84" || crs_.starts_with("EPSG:4326");
-    if (whole)
-      table.notes.push_back(
-          source_.path +
-          ": the headers have times in whole seconds only; the sigmas of the positions grow by 0.3 s of "
-          "flight. A file of exposures (_events.pos, _Timestamp.MRK) is better");
-    const std::vector<double> speeds = speeds_at(table, times, degrees);
-    for (std::size_t i = 0; i < images.size(); ++i) {
-      if (places[i].where.empty()) continue;
-      PositionTable::Row row = places[i];
-      if (whole) row.sigma_horizontal_m = std::hypot(row.sigma_horizontal_m, kTimeSigma * speeds[i]);
-      rows_[images[i]] = row;
-    }
+    const auto rows = rows_on_path(table, times_of(images), source_.time_offset_s, source_.path);
+    for (std::size_t i = 0; i < images.size(); ++i)
+      if (!rows[i].where.empty()) rows_[images[i]] = rows[i];
   }
 
   const PositionSource& source_;
@@ -259,60 +173,25 @@ class RowsOfImages {
   std::vector<std::optional<PositionTable::Row>> rows_;
 };
 
-Eigen::Quaterniond rotation_of_row(const PositionTable::Row& row) {
-  const Eigen::Vector3d a = row.angles_deg * kDegree;
-  switch (row.angles) {
-    case AngleKind::kGimbal:
-      return rotation_from(YawPitchRoll{a[0], a[1], a[2]});
-    case AngleKind::kOmegaPhiKappa:
-      return rotation_from(OmegaPhiKappa{a[0], a[1], a[2]});
-    case AngleKind::kBody:
-      break;
-  }
-  return rotation_from(BodyAttitude{a[0], a[1], a[2]});
-}
-
-// Turns the axes east, north, up at a place into those of the grid.
-Eigen::Quaterniond grid_from_true(const CrsToWgs84& crs, const Geodetic& place) {
-  constexpr double kStepDeg = 1e-4;  // 11 m to the north
-  Geodetic north = place;
-  north.latitude_deg += kStepDeg;
-  const Eigen::Vector3d step = crs.from_wgs84(north) - crs.from_wgs84(place);
-  const double bearing = std::atan2(step.x(), step.y());
-  return Eigen::Quaterniond(Eigen::AngleAxisd(-bearing, Eigen::Vector3d::UnitZ()));
-}
-
 // Writes the rows of one file into the headers.
 class IntoHeaders {
  public:
   IntoHeaders(const PositionSource& source, const std::string& crs)
-      : source_(source), name_(fs::path(source.path).filename()) {
-    if (crs == "local") return;
-    try {
-      crs_.emplace(crs);
-    } catch (const InputError& error) {
-      throw InputError(source.path + ": " + error.what());
-    }
-  }
+      : source_(source), name_(fs::path(source.path).filename()), system_(crs, source.path) {}
 
   void operator()(const PositionTable::Row& row, ScannedImage& image) const {
     ImageHeader& header = image.header;
-    const bool has_angles = row.angles_deg.allFinite();
     if (!row.place.head<2>().allFinite()) return;
-    if (crs_) {
-      const Geodetic place = position(row);
+    if (!system_.local()) {
+      const Geodetic place = system_.position(row);
       header.position = place;
-      if (has_angles) {
-        Eigen::Quaterniond rotation = rotation_of_row(row);
-        if (row.angles == AngleKind::kOmegaPhiKappa) rotation = (rotation * grid_from_true(*crs_, place)).normalized();
-        header.attitude = {rotation, name_};
-      }
+      if (states_attitude(row)) header.attitude = {system_.rotation(row, place), name_};
     } else {
       image.local_position = row.place;
       if (std::isnan(row.place.z()))
         throw InputError(row.where + ": the height is missing; positions in the block's own frame need one");
-      if (has_angles) image.local_attitude = rotation_of_row(row);
-      if (has_angles) header.attitude.reset();
+      if (states_attitude(row)) image.local_attitude = rotation_of(row);
+      if (states_attitude(row)) header.attitude.reset();
     }
     header.position_source = name_;
     header.fix = ImageHeader::Fix::kUnstated;
@@ -322,26 +201,9 @@ class IntoHeaders {
   }
 
  private:
-  Geodetic position(const PositionTable::Row& row) const {
-    Eigen::Vector3d place = row.place;
-    const bool flat = std::isnan(place.z());
-    if (flat) place.z() = 0;
-    try {
-      Geodetic result = crs_->to_wgs84(place);
-      if (!row.offset_m.isZero(0)) {
-        const GroundFrame here{true, result.latitude_deg, result.longitude_deg, result.height_m, ""};
-        result = Georeference(here).to_geodetic(row.offset_m);
-      }
-      if (flat) result.height_m = kNoNumber;
-      return result;
-    } catch (const InputError& error) {
-      throw InputError(row.where + ": " + error.what());
-    }
-  }
-
   const PositionSource& source_;
   std::string name_;
-  std::optional<CrsToWgs84> crs_;
+  SystemOfTable system_;
 };
 
 double flat_distance_m(const Geodetic& a, const Geodetic& b) {
@@ -353,7 +215,7 @@ double flat_distance_m(const Geodetic& a, const Geodetic& b) {
 }  // namespace
 
 bool read_position_files(YamlReader& top, std::vector<ScannedImage>& scanned, Project& project) {
-  const std::vector<PositionSource> sources = read_sources(top);
+  const auto sources = read_table_sources<PositionSource>(top, "positions", read_source);
   if (sources.empty()) return false;
   if (scanned.empty()) refuse_unused(top, "positions", "with 'block', which has its own positions");
   std::vector<std::string> left_out = project.copies;

@@ -72,7 +72,8 @@ double read_receiver_sigma(YamlReader& reader, const std::string& key, const Lim
   return *sigma;
 }
 
-GpsOptions read_gps_options(YamlReader& top, bool from_images) {
+// `given_arms`: the positions have lever arms of their own.
+GpsOptions read_gps_options(YamlReader& top, bool given_arms) {
   GpsOptions options;
   auto reader = top.mapping("gps");
   if (!reader) return options;
@@ -80,7 +81,7 @@ GpsOptions read_gps_options(YamlReader& top, bool from_images) {
   options.use = reader->flag("use").value_or(true);
   options.sigma_horizontal = read_sigma(*reader, "sigma_horizontal_m", kSigmaMetres, kHeldPositionSigma);
   options.sigma_vertical = read_sigma(*reader, "sigma_vertical_m", kSigmaMetres, kHeldPositionSigma);
-  if (!from_images && reader->node("lever_arm_m"))
+  if (given_arms && reader->node("lever_arm_m"))
     refuse_unused(*reader, "lever_arm_m", "with 'block', whose positions have their own lever arms");
   if (const auto arm = reader->numbers("lever_arm_m", 3)) {
     options.lever_arm = {(*arm)[0], (*arm)[1], (*arm)[2]};
@@ -255,11 +256,12 @@ std::optional<GroundFrame> read_origin(YamlReader& top) {
 
 }  // namespace
 
-void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, bool from_files,
-                    const std::vector<Geodetic>& others, const std::optional<GroundFrame>& ground, Project& project) {
+Eigen::Vector3d read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, bool from_files,
+                               const Trajectories& trajectories, const std::vector<Geodetic>& others,
+                               const std::optional<GroundFrame>& ground, Project& project) {
   Block& block = project.block;
   const bool from_images = !scanned.empty();  // otherwise a given block, which has its own ground frame
-  const GpsOptions options = read_gps_options(top, from_images);
+  const GpsOptions options = read_gps_options(top, !from_images && trajectories.empty());
   const auto origin = read_origin(top);
   if (!options.use)
     for (Frame& frame : block.frames) frame.position_prior.reset();
@@ -275,7 +277,7 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, b
         top.where("positions") +
         ": positions: some files are in the block's own frame and some in a system on earth; give all of them "
         "in one kind");
-  if (options.given && options.use) {
+  if (options.given && options.use && trajectories.empty()) {
     const bool has_effect = from_images ? !known.empty() || local : std::ranges::any_of(block.frames, has_position);
     check_effect(top, "gps", "positions", from_images, has_effect, project.warnings);
   }
@@ -302,7 +304,12 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, b
       set_receivers(block, has_position, [&](Mount& receiver) { receiver.position_sigma_m = options.lever_arm_sigma; });
     if (options.use && !options.groups.empty()) set_groups(options, top.where("gps"), project);
   };
-  if (!from_images) return set_unknowns();
+  const auto set_trajectories = [&] {
+    trajectories.set_positions(options.sigma_horizontal, options.sigma_vertical, options.lever_arm, block);
+    set_unknowns();
+    return options.lever_arm;
+  };
+  if (!from_images) return set_trajectories();
   if (!known.empty() && !block.ground.georeferenced)
     project.warnings.push_back(
         "GPS positions are not used, because the block of this job is not georeferenced; start a new job to use them");
@@ -311,15 +318,17 @@ void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, b
     project.warnings.push_back(text_of_one_position(known, scanned.size()));
   }
   const auto sigmas = set_position_priors(scanned, positions, options, block);
-  set_unknowns();
-  project.found = lines_of_positions(scanned, sigmas);
+  const std::vector<std::string> lines = lines_of_positions(scanned, sigmas);
+  project.found.insert(project.found.end(), lines.begin(), lines.end());
+  return set_trajectories();
 }
 
-void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, Project& project) {
+void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, const Trajectories& trajectories,
+                    Project& project) {
   const bool from_images = !scanned.empty();
   const AttitudeOptions options = read_attitude_options(top);
   Block& block = project.block;
-  if (options.given && options.use) {
+  if (options.given && options.use && trajectories.empty()) {
     const auto tells = [](const ScannedImage& image) { return image.header.attitude || image.local_attitude; };
     const bool has_effect =
         from_images ? std::ranges::any_of(scanned, tells) : std::ranges::any_of(block.frames, has_attitude);
@@ -337,7 +346,10 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
       receiver.rotation_sigma_rad = options.boresight_sigma;
     });
   };
-  if (!from_images) return set_boresights();
+  if (!from_images) {
+    trajectories.set_attitudes(options.sigma_deg, block);
+    return set_boresights();
+  }
   std::optional<Georeference> georeference;
   if (block.ground.georeferenced) georeference.emplace(block.ground);
   std::vector<bool> used(scanned.size(), false);
@@ -357,14 +369,10 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, P
           (prior.rotation_cw * georeference->own_from_block(georeference->to_geodetic(frame.position_prior->position)))
               .normalized();
     prior.rotation_cw = (block.mount_of(image).pose.rotation.conjugate() * prior.rotation_cw).normalized();
-    // The heading is less accurate than the vertical. The variances about the ground axes (tilt, tilt, yaw) are
-    // therefore turned to the axes of the rig.
-    const Eigen::Matrix3d r = prior.rotation_cw.toRotationMatrix();
-    const Eigen::Vector3d variance(tilt * tilt, tilt * tilt, yaw * yaw);
-    // R D R' is the covariance in axes of the rig. Its correlations are dropped, because a prior has three sigmas.
-    prior.sigma_rad = (r * variance.asDiagonal() * r.transpose()).diagonal().cwiseSqrt();
+    prior.sigma_rad = attitude_sigmas(prior.rotation_cw, tilt, yaw);
     frame.attitude_prior = prior;
   }
+  trajectories.set_attitudes(options.sigma_deg, block);
   set_boresights();
   const auto lines = lines_of_attitudes(scanned, used, tilt * kDegreesPerRadian, yaw * kDegreesPerRadian);
   project.found.insert(project.found.end(), lines.begin(), lines.end());

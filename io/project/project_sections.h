@@ -4,6 +4,7 @@
 #include "io/project/image_scan.h"
 #include "io/project/inputs/approximate_poses.h"
 #include "io/project/inputs/control_file.h"
+#include "io/project/trajectory/trajectories.h"
 #include "io/text/yaml_reader.h"
 
 namespace megablock {
@@ -37,14 +38,21 @@ std::optional<ControlTable> read_control(YamlReader& top);
 // positions: files of positions of images, which take the place of those in the headers. Returns whether there are any.
 bool read_position_files(YamlReader& top, std::vector<ScannedImage>& scanned, Project& project);
 
+// trajectory: files of poses of frames. They count also with `gps: {use: false}` and `attitude: {use: false}`.
+Trajectories read_trajectories(YamlReader& top, const std::vector<ScannedImage>& scanned,
+                               const std::vector<std::string>& left_out, Project& project);
+
 // gps, origin: sets the position priors and chooses the ground frame. This is `ground` (that of a running job), else
-// that of `origin`, else one about the positions of the images, else one about the `others` (of poses and control).
-// `from_files`: the positions are those of files, which count also with `gps: {use: false}`.
-void read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, bool from_files,
-                    const std::vector<Geodetic>& others, const std::optional<GroundFrame>& ground, Project& project);
+// that of `origin`, else one about the positions of the images, else one about the `others` (of trajectory, poses and
+// control). `from_files`: the positions are those of files, which count also with `gps: {use: false}`. Returns the
+// lever arm of `gps`.
+Eigen::Vector3d read_positions(YamlReader& top, const std::vector<ScannedImage>& scanned, bool from_files,
+                               const Trajectories& trajectories, const std::vector<Geodetic>& others,
+                               const std::optional<GroundFrame>& ground, Project& project);
 
 // attitude: sets the attitude priors from the angles of the images, turned to the vertical of the block's origin.
-void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, Project& project);
+void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, const Trajectories& trajectories,
+                    Project& project);
 
 // Warns if the origin or a control point is more than 50 km (and more than a tenth of the block's extent) away from the
 // images.

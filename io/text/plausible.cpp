@@ -36,6 +36,13 @@ void check_on_vehicle(const Eigen::Vector3d& place_m, const std::string& what, c
                     where, what, place_m.x(), place_m.y(), place_m.z()));
 }
 
+Eigen::Quaterniond unit_rotation(const Eigen::Vector4d& wxyz, const std::string& where) {
+  if (!(std::abs(wxyz.norm() - 1) <= 1e-3))
+    throw InputError(where + ": qw,qx,qy,qz is not a unit quaternion; its norm must be 1 to within 0.001");
+  const Eigen::Quaterniond rotation(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+  return std::abs(wxyz.squaredNorm() - 1) < 1e-15 ? rotation : rotation.normalized();
+}
+
 void check_rotation_vector(const Eigen::Vector3d& vector, const std::string& what, const std::string& where) {
   constexpr double kFullTurn = 2 * std::numbers::pi + 1e-6;
   if (!(vector.norm() <= kFullTurn))

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <string>
 
 namespace megablock {
@@ -27,6 +28,10 @@ void check_within(double value, const Limits& limits, const std::string& what, c
 void check_on_earth(double coordinate, const std::string& what, const std::string& where);
 // For a position on a vehicle (antenna, camera of a rig) more than 1 km from its origin.
 void check_on_vehicle(const Eigen::Vector3d& place_m, const std::string& what, const std::string& where);
+// The unit quaternion w, x, y, z. Throws InputError if its norm differs from 1 by more than a thousandth: few digits
+// make it a little longer or shorter, more than that is another convention, or angles. One that is normal to the last
+// digits stays as it is, so that a written rotation comes back unchanged.
+Eigen::Quaterniond unit_rotation(const Eigen::Vector4d& wxyz, const std::string& where);
 // For a rotation vector (radians) of more than a full turn.
 void check_rotation_vector(const Eigen::Vector3d& vector, const std::string& what, const std::string& where);
 

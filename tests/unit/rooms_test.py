@@ -14,7 +14,7 @@ import sys
 FOLDERS = """
 geometry/numbers geometry/threads geometry/estimation geometry/transform geometry/camera/models geometry/camera geometry/similarity
 geometry/vanishing geometry/two_view geometry/resection geometry/intersection
-io/base io/text io/block io/images io/images/module io/store/hdf5 io/store/job io/store/units io/project/inputs io/project/positions io/project io/result io/evaluation io/evaluation/remarks
+io/base io/text io/block io/images io/images/module io/store/hdf5 io/store/job io/store/units io/project/inputs io/project/positions io/project/trajectory io/project io/result io/evaluation io/evaluation/remarks
 io/exchange/model io/exchange/bal io/exchange/colmap io/exchange/tables io/exchange
 io/simulate/scene io/simulate/streets io/simulate/images io/simulate/blocks io/simulate/files
 io/report/drawing io/report/sections io/report

@@ -8,19 +8,13 @@
 #include <utility>
 
 #include "io/base/error.h"
+#include "io/project/inputs/frames_by_name.h"
 #include "io/text/csv_table.h"
 #include "io/text/plausible.h"
 
 namespace megablock {
 
 namespace {
-
-std::map<std::string, FrameIndex> frames_by_name(const Block& block) {
-  std::map<std::string, FrameIndex> frames;
-  for (ImageIndex i(0); block.images.contains(i); ++i.value) frames.emplace(block.name_of(i), block.images[i].frame);
-  for (FrameIndex f(0); block.frames.contains(f); ++f.value) frames.emplace(block.frames[f].name, f);
-  return frames;
-}
 
 double number_within(const CsvTable& csv, std::size_t row, const std::string& column, const Limits& limits) {
   const double value = csv.needed_number(row, column);

@@ -94,11 +94,7 @@ class CsvReader {
         fail(std::string(kColumns[c]) + ": '" + field + "' is not a number; delete the line if the frame has no pose");
       if (c >= kFirstCoordinate) check_on_earth(value[c], kColumns[c], where());
     }
-    Eigen::Quaterniond rotation(value[1], value[2], value[3], value[4]);
-    // Few digits make a quaternion a little longer or shorter. More than that is another convention, or angles.
-    if (std::abs(rotation.norm() - 1) > 1e-3)
-      fail("qw,qx,qy,qz is not a unit quaternion; its norm must be 1 to within 0.001");
-    rotation.normalize();
+    const Eigen::Quaterniond rotation = unit_rotation({value[1], value[2], value[3], value[4]}, where());
     const std::string& name = fields[columns_[0]];
     if (!seen_.insert(name).second) fail("frame '" + name + "' appears twice; delete one of its lines");
     table_.names.push_back(name);

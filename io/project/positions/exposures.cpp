@@ -7,9 +7,11 @@
 #include <map>
 #include <numeric>
 
+#include "geometry/numbers/angles.h"
 #include "geometry/numbers/median.h"
 #include "io/base/error.h"
 #include "io/project/positions/position_fields.h"
+#include "io/project/positions/row_pose.h"
 
 namespace megablock {
 
@@ -21,6 +23,7 @@ constexpr double kEnoughExposures = 0.9, kRival = 0.8;
 constexpr double kPathGap = 5, kCubicSpan = 4;  // s
 constexpr double kSameEvent = 0.1;              // s
 constexpr double kQuarter = 900;                // s, the step of time zones
+constexpr double kTimeSigma = 0.3;              // s, of times in whole seconds
 
 // The last group of at least three digits of a name without folder and ending; -1 if there is none.
 std::int64_t exposure_number(const std::string& name) {
@@ -179,6 +182,12 @@ PositionTable::Row row_at(const std::vector<PositionTable::Row>& rows, double ti
   result.place = cubic ? lagrange(rows, next - 2, 4, time) : lagrange(rows, next - 1, 2, time);
   result.sigma_horizontal_m = std::fmax(a.sigma_horizontal_m, b.sigma_horizontal_m);
   result.sigma_vertical_m = std::fmax(a.sigma_vertical_m, b.sigma_vertical_m);
+  result.pass = a.pass;
+  if (!states_attitude(a) || !states_attitude(b)) return result;
+  result.angles = a.angles;
+  result.rotation = rotation_of(a).slerp((time - a.time_s) / (b.time_s - a.time_s), rotation_of(b)).normalized();
+  result.sigma_tilt_deg = std::fmax(a.sigma_tilt_deg, b.sigma_tilt_deg);
+  result.sigma_heading_deg = std::fmax(a.sigma_heading_deg, b.sigma_heading_deg);
   return result;
 }
 
@@ -196,6 +205,24 @@ std::string zone_text(double zone_s) {
   return fmt::format("UTC{}{:02d}:{:02d}", zone_s < 0 ? "-" : "+", minutes / 60, minutes % 60);
 }
 
+// Metres per second along the path at each time, from the positions half a second before and after; 0 off the path.
+std::vector<double> speeds_at(const PositionTable& path, const std::vector<double>& times, bool degrees) {
+  std::vector<double> before = times, after = times, speeds;
+  for (double& time : before) time -= 0.5;
+  for (double& time : after) time += 0.5;
+  const std::vector<PositionTable::Row> from = interpolate(path, before), to = interpolate(path, after);
+  constexpr double kMetresPerDegree = 111320;  // along meridians and along the equator, to one per cent
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    Eigen::Vector3d step = to[i].place - from[i].place;
+    if (degrees) {
+      step.x() *= kMetresPerDegree * std::cos(from[i].place.y() * kDegree);
+      step.y() *= kMetresPerDegree;
+    }
+    speeds.push_back(step.allFinite() ? step.norm() : 0);
+  }
+  return speeds;
+}
+
 }  // namespace
 
 std::vector<std::int64_t> rows_of_images(const PositionTable& table, const std::vector<ImageTime>& images,
@@ -210,6 +237,17 @@ std::vector<std::int64_t> rows_of_images(const PositionTable& table, const std::
     return rows;
   }
   return rows_by_time(table, images, path);
+}
+
+void make_absolute(PositionTable& path, const std::vector<ImageTime>& images) {
+  constexpr double kWeek = 7 * 86400;
+  const auto [first, last] = std::ranges::minmax(path.rows, {}, &PositionTable::Row::time_s);
+  const auto timed = std::ranges::find_if(
+      images, [](const ImageTime& image) { return !std::isnan(image.gps_s) || !std::isnan(image.clock_s); });
+  if (!(last.time_s < 2 * kWeek) || timed == images.end()) return;
+  const double image = std::isnan(timed->gps_s) ? timed->clock_s : timed->gps_s;
+  const double week = std::round((image - gps_week_seconds(0, 0) - (first.time_s + last.time_s) / 2) / kWeek);
+  for (PositionTable::Row& row : path.rows) row.time_s = gps_week_seconds(week, row.time_s);
 }
 
 std::vector<PositionTable::Row> interpolate(const PositionTable& path, const std::vector<double>& times_s) {
@@ -248,6 +286,25 @@ std::vector<double> times_on_path(const PositionTable& path, const std::vector<I
   for (std::size_t i = 0; i < images.size(); ++i)
     times[i] = images[i].clock_s - zones[0] + leap_seconds(images[i].clock_s);
   return times;
+}
+
+std::vector<PositionTable::Row> rows_on_path(PositionTable& path, const std::vector<ImageTime>& images, double offset_s,
+                                             const std::string& file) {
+  make_absolute(path, images);
+  const std::vector<double> times = times_on_path(path, images, offset_s, file, path.notes);
+  std::vector<PositionTable::Row> rows = interpolate(path, times);
+  const bool whole =
+      std::ranges::all_of(times, [](double time) { return std::isnan(time) || time == std::floor(time); });
+  if (!whole) return rows;
+  path.notes.push_back(
+      file +
+      ": the headers have times in whole seconds only; the sigmas of the positions grow by 0.3 s of flight. A file of "
+      "exposures (_events.pos, _Timestamp.MRK) is better");
+  const bool degrees = path.crs == "WGS84" || path.crs.starts_with("EPSG:4326");
+  const std::vector<double> speeds = speeds_at(path, times, degrees);
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i].sigma_horizontal_m = std::hypot(rows[i].sigma_horizontal_m, kTimeSigma * speeds[i]);
+  return rows;
 }
 
 PositionTable exposures_on(const PositionTable& solution, const PositionTable& exposures, const std::string& file,

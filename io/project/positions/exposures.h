@@ -10,8 +10,8 @@
 // In 1 and 2 all offsets between header and exposure must agree within 3 s, else the file belongs to other images.
 //
 // Path: images are interpolated at their times, by the cubic through the four epochs around where these lie within 4 s,
-// else linearly; across more than 5 s there is no position. A time whose zone is unknown is taken in the one zone (in
-// steps of a quarter of an hour) that puts the images onto the path.
+// else linearly; across more than 5 s there is no position. Attitudes turn evenly from one epoch to the next. A time
+// whose zone is unknown is taken in the one zone (in steps of a quarter of an hour) that puts the images onto the path.
 #pragma once
 
 #include <string>
@@ -32,6 +32,9 @@ struct ImageTime {
 std::vector<std::int64_t> rows_of_images(const PositionTable& table, const std::vector<ImageTime>& images,
                                          const std::string& path);
 
+// Makes seconds of the GPS week absolute, in the week in which the images were taken. Other times stay.
+void make_absolute(PositionTable& path, const std::vector<ImageTime>& images);
+
 // A row for each time on the path, sorted as the times are; its `where` is empty off the path.
 std::vector<PositionTable::Row> interpolate(const PositionTable& path, const std::vector<double>& times_s);
 
@@ -39,6 +42,11 @@ std::vector<PositionTable::Row> interpolate(const PositionTable& path, const std
 // found as above. Adds a note about the zone. Throws InputError if no zone fits, or several do.
 std::vector<double> times_on_path(const PositionTable& path, const std::vector<ImageTime>& images, double offset_s,
                                   const std::string& file, std::vector<std::string>& notes);
+
+// The rows of images at their times; `where` is empty for those off the path. Makes the times of the path absolute.
+// Times in whole seconds add 0.3 s of motion to the sigmas, with a note.
+std::vector<PositionTable::Row> rows_on_path(PositionTable& path, const std::vector<ImageTime>& images, double offset_s,
+                                             const std::string& file);
 
 // Exposures (_Timestamp.MRK) whose places come from a better solution of the antenna: from its path, or from its events
 // of the same times. The offsets of the exposures stay. Those off the path are left out with a note.

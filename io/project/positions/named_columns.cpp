@@ -1,5 +1,6 @@
 // A table with the names of its columns in the first line (position_columns.h says which names are known), separated by
-// commas, semicolons or tabs; or any table whose columns the project file names or numbers from 1 (`columns`).
+// commas, semicolons or tabs; or any table whose columns the project file names or numbers from 1 (`columns`). Where no
+// column names the image, rows are epochs of a path.
 //
 // Latitudes and longitudes are WGS84 unless `crs` says otherwise; x and y need `crs`, in the file ("# crs: EPSG:25832")
 // or in the project. Heights are metres, above the ellipsoid unless the system has a vertical part.
@@ -13,6 +14,11 @@
 namespace megablock {
 
 namespace {
+
+// Whether rows have a place, and an image or a time that it belongs to.
+bool names_rows(const PositionColumns& columns) {
+  return columns.has_place() && (columns.has("image") || columns.has("time"));
+}
 
 // The first line that is not a comment, or a comment that names columns.
 struct ColumnHeader {
@@ -33,15 +39,12 @@ ColumnHeader column_header(const PositionText& text) {
     header.names = split_fields(line, header.separator);
     header.columns = PositionColumns(header.names);
     header.line = l;
-    if (!comment || (header.columns.has("image") && header.columns.has_place())) return header;
+    if (!comment || names_rows(header.columns)) return header;
   }
   return header;
 }
 
-bool has_columns(const PositionText& text) {
-  const ColumnHeader header = column_header(text);
-  return header.columns.has("image") && header.columns.has_place();
-}
+bool has_columns(const PositionText& text) { return names_rows(column_header(text).columns); }
 
 // The column that the project names for a field: a name of the header, or its number from 1.
 std::size_t column_of(const ColumnHeader& header, const std::string& field, const std::string& value,
@@ -65,11 +68,14 @@ PositionTable read_columns(const PositionText& text, const PositionOptions& opti
   ColumnHeader header = column_header(text);
   for (const auto& [field, value] : options.columns)
     header.columns.set(field, column_of(header, field, value, text.path));
-  if (!header.columns.has("image") || !header.columns.has_place())
+  if (!names_rows(header.columns))
     throw InputError(text.where(text.lines[header.line]) +
-                     ": the header names no columns of image and position; name them in the project file: 'columns: "
-                     "{image: ..., x: ..., y: ..., z: ...}'");
+                     ": the header names no columns of image (or time) and position; name them in the project file: "
+                     "'columns: {image: ..., x: ..., y: ..., z: ...}'");
   PositionTable table;
+  if (!header.columns.has("image")) table.kind = PositionTable::Kind::kPath;
+  table.states_sigmas = header.columns.has_sigmas();
+  table.states_angle_sigmas = header.columns.has_angle_sigmas();
   table.crs = crs_of_columns(text);
   if (table.crs.empty() && header.columns.geodetic()) table.crs = "WGS84";
   if (table.crs.empty() && options.crs.empty())

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "io/project/positions/position_fields.h"
+#include "io/text/plausible.h"
+#include "io/text/settings_reader.h"
 
 namespace megablock {
 
@@ -23,7 +25,8 @@ const std::vector<Synonyms>& synonyms() {
       {"latitude", {"latitude", "lat", "gps_latitude", "gpslatitude", "wgs84_latitude"}},
       {"longitude", {"longitude", "lon", "long", "lng", "gps_longitude", "gpslongitude", "wgs84_longitude"}},
       {"height",
-       {"height", "ellipsoidal_height", "ellh", "altitude", "alt", "gps_altitude", "gpsaltitude", "elevation", "h"}},
+       {"height", "ellipsoidal_height", "ellh", "h_ell", "altitude", "alt", "gps_altitude", "gpsaltitude", "elevation",
+        "h"}},
       {"x", {"x", "east", "easting", "x_longitude", "x_east", "x_easting", "geo_x", "e"}},
       {"y", {"y", "north", "northing", "y_latitude", "y_north", "y_northing", "geo_y", "n"}},
       {"z", {"z", "z_altitude", "z_height", "geo_z", "up", "u"}},
@@ -32,13 +35,34 @@ const std::vector<Synonyms>& synonyms() {
         "accuracy_xy", "xy_accuracy", "gpsxyaccuracy", "horz_accuracy", "sigmahoriz", "horizontal_sigma",
         "rms_horizontal", "h_acc", "accuracy_horiz"}},
       {"sigma_x",
-       {"sigma_x", "accuracy_x", "x_accuracy", "accuracyx", "sd_e", "sde", "rtkstdlon", "std_east", "sigma_east"}},
+       {"sigma_x", "accuracy_x", "x_accuracy", "accuracyx", "sd_e", "sde", "rtkstdlon", "std_east", "sigma_east",
+        "sdeast", "sd_east", "e_sd"}},
       {"sigma_y",
-       {"sigma_y", "accuracy_y", "y_accuracy", "accuracyy", "sd_n", "sdn", "rtkstdlat", "std_north", "sigma_north"}},
+       {"sigma_y", "accuracy_y", "y_accuracy", "accuracyy", "sd_n", "sdn", "rtkstdlat", "std_north", "sigma_north",
+        "sdnorth", "sd_north", "n_sd"}},
       {"sigma_vertical",
-       {"sigma_vertical", "accuracy_vert", "accuracy_vertical", "vertical_accuracy", "accuracy_z", "z_accuracy",
-        "accuracyz", "gpszaccuracy", "vert_accuracy", "sigmavert", "vertical_sigma", "sd_u", "sdu", "rtkstdhgt",
-        "std_up", "sigma_z", "v_acc"}},
+       {"sigma_vertical",
+        "accuracy_vert",
+        "accuracy_vertical",
+        "vertical_accuracy",
+        "accuracy_z",
+        "z_accuracy",
+        "accuracyz",
+        "gpszaccuracy",
+        "vert_accuracy",
+        "sigmavert",
+        "vertical_sigma",
+        "sd_u",
+        "sdu",
+        "rtkstdhgt",
+        "std_up",
+        "sigma_z",
+        "v_acc",
+        "sdheight",
+        "sd_height",
+        "sd_up",
+        "sdup",
+        "u_sd"}},
       {"sigma", {"sigma", "accuracy", "accuracy_xyz"}},
       {"yaw", {"yaw", "heading", "azimuth"}},
       {"pitch", {"pitch"}},
@@ -48,7 +72,21 @@ const std::vector<Synonyms>& synonyms() {
       {"gimbal_roll", {"gimbal_roll", "gimbalrolldegree", "gimbalroll", "camera_roll"}},
       {"omega", {"omega"}},
       {"phi", {"phi"}},
-      {"kappa", {"kappa"}}};
+      {"kappa", {"kappa"}},
+      {"qw", {"qw", "q_w"}},
+      {"qx", {"qx", "q_x"}},
+      {"qy", {"qy", "q_y"}},
+      {"qz", {"qz", "q_z"}},
+      {"sigma_rotation", {"sigma_rotation"}},
+      {"sigma_roll", {"sigma_roll", "rollsd", "sd_roll", "std_roll", "roll_sd"}},
+      {"sigma_pitch", {"sigma_pitch", "pitchsd", "sd_pitch", "std_pitch", "pitch_sd"}},
+      {"sigma_heading",
+       {"sigma_heading", "sigma_yaw", "hdngsd", "headingsd", "sd_heading", "std_heading", "std_yaw", "heading_sd"}},
+      {"time",
+       {"time_s", "time", "gpstime", "gps_time", "gps_seconds", "gpsseconds", "timestamp", "seconds_of_week", "sow",
+        "tow", "gps_sow", "gps_tow"}},
+      {"week", {"week", "gpsweek", "gps_week"}},
+      {"pass", {"pass", "drive"}}};
   return all;
 }
 
@@ -94,6 +132,10 @@ PositionColumns::PositionColumns(const std::vector<std::string>& header) {
     }
 }
 
+bool PositionColumns::has_sigmas() const { return has("sigma") || has("sigma_x") || has("sigma_horizontal"); }
+
+bool PositionColumns::has_angle_sigmas() const { return has("sigma_rotation") || has("sigma_roll"); }
+
 bool PositionColumns::geodetic() const { return has("latitude") && has("longitude"); }
 
 bool PositionColumns::has_place() const { return geodetic() || (has("x") && has("y")); }
@@ -108,42 +150,82 @@ std::string PositionColumns::fields() {
   return list;
 }
 
+// The texts of a line by field.
+struct PositionColumns::Texts {
+  const std::map<std::string, std::size_t>& place;
+  const std::vector<std::string>& fields;
+  Separator separator;
+  const std::string& where;
+
+  std::string text(const char* field) const {
+    const auto found = place.find(field);
+    return found == place.end() || found->second >= fields.size() ? std::string() : fields[found->second];
+  }
+  bool given(std::initializer_list<const char*> names) const {
+    return std::ranges::none_of(names, [&](const char* name) { return text(name).empty(); });
+  }
+  double number(const char* field) const { return position_number(text(field), separator, field, where); }
+  double sigma_m(const char* field) const { return position_sigma_m(text(field), separator, field, where); }
+  double sigma_deg(const char* field) const { return position_sigma_deg(text(field), separator, field, where); }
+};
+
+void PositionColumns::set_sigmas(const Texts& of, PositionTable::Row& row) {
+  const double all = of.sigma_m("sigma");
+  row.sigma_horizontal_m = std::fmax(of.sigma_m("sigma_x"), of.sigma_m("sigma_y"));
+  if (const double stated = of.sigma_m("sigma_horizontal"); !std::isnan(stated)) row.sigma_horizontal_m = stated;
+  if (std::isnan(row.sigma_horizontal_m)) row.sigma_horizontal_m = all;
+  row.sigma_vertical_m = of.sigma_m("sigma_vertical");
+  if (std::isnan(row.sigma_vertical_m)) row.sigma_vertical_m = all;
+  const double rotation = of.sigma_deg("sigma_rotation");
+  row.sigma_tilt_deg = std::fmax(of.sigma_deg("sigma_roll"), of.sigma_deg("sigma_pitch"));
+  if (std::isnan(row.sigma_tilt_deg)) row.sigma_tilt_deg = rotation;
+  row.sigma_heading_deg = of.sigma_deg("sigma_heading");
+  if (std::isnan(row.sigma_heading_deg)) row.sigma_heading_deg = rotation;
+}
+
+void PositionColumns::set_attitude(const Texts& of, std::optional<AngleKind> other, PositionTable::Row& row) {
+  if (of.given({"qw", "qx", "qy", "qz"})) {
+    row.rotation = unit_rotation({of.number("qw"), of.number("qx"), of.number("qy"), of.number("qz")}, of.where);
+    row.angles = AngleKind::kRotation;
+    return;
+  }
+  for (const AngleFields& angles : kAngleFields) {
+    if (!of.given({angles.first, angles.second, angles.third})) continue;
+    row.angles_deg = {of.number(angles.first), of.number(angles.second), of.number(angles.third)};
+    row.angles = angles.kind == AngleKind::kBody ? other.value_or(angles.kind) : angles.kind;
+    return;
+  }
+}
+
+void PositionColumns::set_time(const Texts& of, PositionTable::Row& row) {
+  const auto seconds = [&](const char* field) {
+    return parse_number(with_decimal_point(of.text(field), of.separator), field, of.where);
+  };
+  if (!of.text("time").empty()) row.time_s = seconds("time");
+  if (!of.text("week").empty() && !std::isnan(row.time_s)) row.time_s = gps_week_seconds(seconds("week"), row.time_s);
+  if (!of.text("pass").empty()) row.pass = parse_integer(of.text("pass"), "pass", of.where);
+}
+
 std::optional<PositionTable::Row> PositionColumns::row(const std::vector<std::string>& fields, Separator separator,
                                                        const std::string& where, std::optional<AngleKind> other) const {
-  const auto text = [&](const char* field) {
-    const auto found = place_.find(field);
-    return found == place_.end() || found->second >= fields.size() ? std::string() : fields[found->second];
-  };
-  const auto sigma = [&](const char* field) { return position_sigma_m(text(field), separator, field, where); };
+  const Texts of{place_, fields, separator, where};
   PositionTable::Row row;
   row.where = where;
-  row.image = text("image");
+  row.image = of.text("image");
   const bool degrees = geodetic();
-  const std::string first = text(degrees ? "longitude" : "x"), second = text(degrees ? "latitude" : "y");
-  if (row.image.empty() || first.empty() || second.empty()) return std::nullopt;
+  const std::string first = of.text(degrees ? "longitude" : "x"), second = of.text(degrees ? "latitude" : "y");
+  if ((row.image.empty() && of.text("time").empty()) || first.empty() || second.empty()) return std::nullopt;
   if (degrees)
     row.place.head<2>() = Eigen::Vector2d(position_degrees(first, separator, "longitude", where),
                                           position_degrees(second, separator, "latitude", where));
   else
-    row.place.head<2>() =
-        Eigen::Vector2d(position_number(first, separator, "x", where), position_number(second, separator, "y", where));
-  const std::string height = has("height") ? text("height") : text("z");
+    row.place.head<2>() = Eigen::Vector2d(of.number("x"), of.number("y"));
+  const std::string height = has("height") ? of.text("height") : of.text("z");
   if (!height.empty() && lower_case(height) != "nan")
     row.place.z() = position_number(height, separator, "height", where);
-  const double all = sigma("sigma");
-  row.sigma_horizontal_m = std::fmax(sigma("sigma_x"), sigma("sigma_y"));
-  if (const double stated = sigma("sigma_horizontal"); !std::isnan(stated)) row.sigma_horizontal_m = stated;
-  if (std::isnan(row.sigma_horizontal_m)) row.sigma_horizontal_m = all;
-  row.sigma_vertical_m = sigma("sigma_vertical");
-  if (std::isnan(row.sigma_vertical_m)) row.sigma_vertical_m = all;
-  for (const AngleFields& angles : kAngleFields) {
-    if (text(angles.first).empty() || text(angles.second).empty() || text(angles.third).empty()) continue;
-    row.angles_deg = {position_number(text(angles.first), separator, angles.first, where),
-                      position_number(text(angles.second), separator, angles.second, where),
-                      position_number(text(angles.third), separator, angles.third, where)};
-    row.angles = angles.kind == AngleKind::kBody ? other.value_or(angles.kind) : angles.kind;
-    break;
-  }
+  set_time(of, row);
+  set_sigmas(of, row);
+  set_attitude(of, other, row);
   return row;
 }
 

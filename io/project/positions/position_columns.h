@@ -8,6 +8,10 @@
 //     sigma_horizontal, sigma_x, sigma_y          metres; the larger of the last two stands for the first
 //     sigma_vertical, sigma                       metres; the last one stands for whatever else is not given
 //     yaw, pitch, roll                            degrees (kBody), or gimbal_yaw, ... (kGimbal), or omega, phi, kappa
+//     qw, qx, qy, qz                              unit quaternion of R_cw: axes of the system -> camera or rig
+//     sigma_roll, sigma_pitch, sigma_heading      degrees; sigma_rotation stands for whatever is not given
+//     time, week                                  GPS seconds since 1970-01-01, or of a week; week of GPS
+//     pass                                        number of the drive or flight line
 //
 // A name of a column is compared in lower case, without units in brackets, with '_' for everything that is no letter or
 // digit, and without the ending _m or _deg.
@@ -29,11 +33,14 @@ class PositionColumns {
   explicit PositionColumns(const std::vector<std::string>& header);
 
   bool has(const std::string& field) const { return place_.contains(field); }
-  bool has_place() const;  // latitude and longitude, or x and y
-  bool geodetic() const;   // latitude and longitude
+  bool has_place() const;         // latitude and longitude, or x and y
+  bool geodetic() const;          // latitude and longitude
+  bool has_sigmas() const;        // of positions
+  bool has_angle_sigmas() const;  // of attitudes
   void set(const std::string& field, std::size_t column) { place_[field] = column; }
 
-  // The row of a line; nothing if it has no image or no coordinates, as programs write images without position.
+  // The row of a line; nothing if it has neither image nor time, or no coordinates, as programs write images without
+  // position.
   // `other`: what yaw, pitch and roll are, if not kBody. Throws InputError for values that are not numbers.
   std::optional<PositionTable::Row> row(const std::vector<std::string>& fields, Separator separator,
                                         const std::string& where, std::optional<AngleKind> other = {}) const;
@@ -42,6 +49,11 @@ class PositionColumns {
   static std::string fields();  // all names, for messages
 
  private:
+  struct Texts;
+  static void set_time(const Texts& of, PositionTable::Row& row);
+  static void set_sigmas(const Texts& of, PositionTable::Row& row);
+  static void set_attitude(const Texts& of, std::optional<AngleKind> other, PositionTable::Row& row);
+
   std::map<std::string, std::size_t> place_;  // field -> column
 };
 

@@ -40,13 +40,27 @@ double position_degrees(const std::string& text, Separator separator, const std:
   return sign * degrees;
 }
 
-double position_sigma_m(const std::string& text, Separator separator, const std::string& what,
-                        const std::string& where) {
+namespace {
+
+double position_sigma(const std::string& text, Separator separator, const Limits& limits, const std::string& what,
+                      const std::string& where) {
   if (text.empty() || lower_case(text) == "nan") return kNoNumber;
   const double sigma = position_number(text, separator, what, where);
   if (sigma == 0) return kNoNumber;
-  check_within(sigma, kSigmaMetres, what, where);
+  check_within(sigma, limits, what, where);
   return sigma;
+}
+
+}  // namespace
+
+double position_sigma_m(const std::string& text, Separator separator, const std::string& what,
+                        const std::string& where) {
+  return position_sigma(text, separator, kSigmaMetres, what, where);
+}
+
+double position_sigma_deg(const std::string& text, Separator separator, const std::string& what,
+                          const std::string& where) {
+  return position_sigma(text, separator, kSigmaDegrees, what, where);
 }
 
 void read_sigmas(const std::vector<std::string>& fields, std::size_t first, Separator separator,

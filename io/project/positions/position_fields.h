@@ -20,6 +20,10 @@ double position_degrees(const std::string& text, Separator separator, const std:
 double position_sigma_m(const std::string& text, Separator separator, const std::string& what,
                         const std::string& where);
 
+// The same in degrees.
+double position_sigma_deg(const std::string& text, Separator separator, const std::string& what,
+                          const std::string& where);
+
 // Reads a horizontal and a vertical sigma from two fields that follow each other, by position_sigma_m().
 void read_sigmas(const std::vector<std::string>& fields, std::size_t first, Separator separator,
                  const std::string& where, PositionTable::Row& row);

@@ -15,7 +15,8 @@ namespace megablock {
 // A file as its reader gets it.
 struct PositionText {
   std::string path;
-  std::vector<TextLine> lines;  // those that are not empty
+  std::vector<TextLine> lines;  // those that are not empty; none of a binary file
+  bool binary = false;
   std::string where(const TextLine& line) const { return path + ":" + std::to_string(line.number); }
 };
 
@@ -34,6 +35,10 @@ extern const PositionFormat kRtklibPos;     // rtklib_pos.cpp
 extern const PositionFormat kMetashape;     // metashape_reference.cpp
 extern const PositionFormat kPix4d;         // pix4d_geolocation.cpp
 extern const PositionFormat kOdmGeo;        // odm_geo.cpp
+extern const PositionFormat kSbet;          // sbet.cpp
+extern const PositionFormat kInertial;      // inertial_text.cpp
+extern const PositionFormat kTum;           // tum_trajectory.cpp
+extern const PositionFormat kKitti;         // kitti_poses.cpp
 extern const PositionFormat kNamedColumns;  // named_columns.cpp
 
 // The table, in the order in which formats are tried.
@@ -41,6 +46,9 @@ const std::vector<const PositionFormat*>& position_formats();
 
 // The format of a file; nullptr if none recognises it.
 const PositionFormat* recognise_positions(const PositionText& text);
+
+// The file as readers get it. Throws InputError if it cannot be read.
+PositionText read_position_text(const std::string& path);
 
 // Reads a file. Throws InputError if it cannot be read, has no rows, or has none of the formats.
 PositionTable read_position_table(const std::string& path, const PositionOptions& options);

@@ -1,4 +1,5 @@
-// Writes the block.yaml of a simulated block, but does not overwrite one that the user has edited.
+// Writes the text files of a simulated block: block.yaml, without overwriting one that the user has edited, and what is
+// known of the poses.
 // Internal to io/: it is not installed.
 #pragma once
 
@@ -16,5 +17,9 @@ enum class EditedProject { kRefuse, kOverwrite };
 void refuse_edited_project(const std::string& folder, const std::string& text, EditedProject edited);
 // Writes a text file. Throws InputError if that is impossible.
 void write_text(const std::string& path, const std::string& text);
+
+// Writes the observations of poses that a block has as a user's own files: trajectory.csv (positions, attitudes),
+// relative_poses.csv, and poses.csv (start values). A file without lines is not written.
+void write_pose_files(const Block& block, const std::string& folder);
 
 }  // namespace megablock

@@ -66,6 +66,7 @@ void write_simulated_block(const SimulationOptions& options, const std::string& 
   write_block((root / "given.h5").string(), simulated.block);
   write_state((root / "truth.h5").string(), simulated.truth);
   write_pose_csv((root / "truth.csv").string(), pose_table(simulated.block, simulated.truth));
+  write_pose_files(simulated.block, folder);
   write_text((root / "block.yaml").string(), kProject);
 }
 

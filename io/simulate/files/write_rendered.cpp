@@ -124,12 +124,6 @@ void write_rig(const Block& block, const fs::path& root) {
   write_text((root / "rig_assignments.json").string(), assignments.dump(2) + "\n");
 }
 
-// The given poses, for users who want to start from them.
-PoseTable given_poses(const Block& block) {
-  const BlockState start = initial_state(block);
-  return pose_table(block, start);
-}
-
 // Writes the control points (without the check points) in the form that other programs read: longitude, latitude,
 // ellipsoidal height, then column and row, which count from the centre of the first pixel.
 void write_gcp_list(const Block& block, const fs::path& path) {
@@ -183,8 +177,10 @@ void write_cameras(const SimulationOptions& options, const Block& block, std::os
   }
 }
 
-std::string project_text(const SimulationOptions& options, const Block& block, bool has_poses) {
+std::string project_text(const SimulationOptions& options, const Block& block) {
   const GroundFrame& ground = block.ground;
+  const bool has_poses =
+      std::ranges::any_of(block.frames, [](const Frame& frame) { return frame.given_pose.has_value(); });
   std::ostringstream yaml;
   yaml << std::setprecision(12) << "# A rendered block; the truth is in truth.csv (poses) and truth.h5.\n"
        << "images: images\n"
@@ -207,7 +203,9 @@ std::string project_text(const SimulationOptions& options, const Block& block, b
   }
   if (!block.control_points.empty()) yaml << "control: control.csv\n";
   if (has_poses && is_stereopolis(options))
-    yaml << "poses: poses.csv  # the trajectory\n";
+    yaml << "poses: poses.csv  # the trajectory as start values\n"
+         << "trajectory: {file: trajectory.csv, use: [positions, attitudes]}  # the same as observations\n"
+         << (block.relative_poses.empty() ? "" : "relative_poses: relative_poses.csv  # odometer and gyroscopes\n");
   else if (has_poses)
     yaml << "# poses: poses.csv  # approximate poses; without them the images are oriented first\n";
   write_cameras(options, block, yaml);
@@ -235,14 +233,13 @@ void write_rendered_block(const SimulationOptions& asked, const std::string& fol
   simulated.block = layout.block;
   simulated.truth = layout.truth;
   simulate_given(options, simulated);
-  const PoseTable poses = given_poses(simulated.block);
-  const std::string project = project_text(options, simulated.block, !poses.names.empty());
+  const std::string project = project_text(options, simulated.block);
   refuse_edited_project(folder, project, edited);
   write_images(options, layout, simulated.block, root / "images");
   write_pose_csv((root / "truth.csv").string(), pose_table(simulated.block, simulated.truth));
   write_state((root / "truth.h5").string(), simulated.truth);
   if (has_rig(simulated.block)) write_rig(simulated.block, root);
-  if (!poses.names.empty()) write_pose_csv((root / "poses.csv").string(), poses);
+  write_pose_files(simulated.block, folder);
   if (!simulated.block.control_points.empty()) {
     write_control_csv((root / "control.csv").string(), simulated.block);
     write_gcp_list(simulated.block, root / "gcp_list.txt");

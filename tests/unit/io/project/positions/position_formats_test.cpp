@@ -8,38 +8,18 @@
 #include "io/base/error.h"
 #include "io/project/positions/position_columns.h"
 #include "io/project/positions/position_fields.h"
-#include "tests/support/io/image_files.h"
-#include "tests/support/io/scratch_directory.h"
+#include "tests/support/io/position_texts.h"
 
 namespace megablock {
 namespace {
 
-using fixture::message_of;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using TableKind = PositionTable::Kind;
 
-class PositionFormats : public ::testing::Test {
- protected:
-  PositionTable read(const std::string& name, const std::string& text, const PositionOptions& options = {}) {
-    fixture::write_file(folder_.path(name), text);
-    return read_position_table(folder_.path(name), options);
-  }
-  std::string format_of(const std::string& name, const std::string& text) {
-    fixture::write_file(folder_.path(name), text);
-    const PositionFormat* format = recognise_positions({name, read_text_lines(folder_.path(name))});
-    return format != nullptr ? format->name : "none";
-  }
-  std::string refusal(const std::string& name, const std::string& text, const PositionOptions& options = {}) {
-    std::string message = message_of<InputError>([&] { read(name, text, options); });
-    for (std::size_t at; (at = message.find(folder_.path() + "/")) != std::string::npos;)
-      message.erase(at, folder_.path().size() + 1);
-    return message;
-  }
-  ScratchDirectory folder_;
-};
+class PositionFormats : public fixture::PositionTexts {};
 
 // From the documentation of ODM, with a line of each length.
 const std::string kGeo =
