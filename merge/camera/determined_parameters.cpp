@@ -3,6 +3,7 @@
 #include "merge/camera/determined_parameters.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "adjust/calibration/rig_observations.h"
 #include "adjust/tile/rolling_start.h"
@@ -44,9 +45,9 @@ class Determination {
       }
       const auto row = static_cast<std::size_t>(found - row_camera_.begin());
       CameraChoice choice = chosen[row];
-      choice.focal_contradicted = contradicts_focal(block_.cameras[camera], whole_.state.cameras[row]);
       choice.focal_px = whole_.state.cameras[row][kFocal];
-      choice.focal_sigma_px = focal_sigma(rows_[row]);
+      choice.focal_sigma_px = std::max(focal_sigma(rows_[row]), choice.focal_scatter_px);
+      choice.focal_contradicted = contradicts_focal(block_.cameras[camera], choice);
       result.push_back(std::move(choice));
     }
     return result;
@@ -55,10 +56,11 @@ class Determination {
  private:
   bool wanted(CameraIndex camera) const { return std::binary_search(wanted_.begin(), wanted_.end(), camera); }
 
-  static bool contradicts_focal(const Camera& camera, const Intrinsics& found) {
+  static bool contradicts_focal(const Camera& camera, const CameraChoice& choice) {
     constexpr double kSigmas = 3;
     const double sigma = default_intrinsic_sigmas(camera)[kFocal];
-    return camera.focal_known && sigma > 0 && std::abs(found[kFocal] - camera.intrinsics[kFocal]) > kSigmas * sigma;
+    return camera.focal_known && sigma > 0 &&
+           std::abs(choice.focal_px - camera.intrinsics[kFocal]) > kSigmas * std::hypot(sigma, choice.focal_sigma_px);
   }
 
   // With all parameters of the last choice estimated; 0: it is held.

@@ -13,6 +13,7 @@ void ParameterChoiceOptions::check() const {
   if (!(least_gain >= 0 && least_gain < 1)) throw InputError("least_gain must lie in [0, 1)");
   if (!(fewest_images >= 2 && groups >= fewest_images))
     throw InputError("groups must be at least fewest_images, that at least 2");
+  if (!(certain >= 1)) throw InputError("certain must be at least 1");
   if (!(weak > 0 && weak <= 1)) throw InputError("weak must lie in (0, 1]");
 }
 
@@ -155,7 +156,9 @@ class Chooser {
     const double scatter = (by_group.array() - by_group.mean()).matrix().squaredNorm() / std::max(1.0, n - 1);
     const double fewer = std::max(
         1.0, static_cast<double>(options_.groups) / static_cast<double>(std::max<std::int64_t>(1, forms_.images)));
-    return {by_group.sum(), std::max(std::sqrt(n * scatter), options_.least_gain * fewer * best_.sum())};
+    const double error_of_sum = std::sqrt(n * scatter);
+    return {by_group.sum(),
+            std::clamp(options_.least_gain * fewer * best_.sum(), error_of_sum, options_.certain * error_of_sum)};
   }
 
   bool hold_one() {
@@ -213,8 +216,21 @@ class Chooser {
       for (std::size_t i = 0; i < camera.parameters.size(); ++i)
         if (free_[static_cast<std::size_t>(camera.first) + i]) result[c].estimated |= mask_of(camera.parameters[i]);
       result[c].reason = reason_of(c);
+      result[c].focal_scatter_px = focal_scatter(camera);
     }
     return result;
+  }
+
+  // The sigma of the focal length from its scatter over the groups that are left out (jackknife); 0: it is held.
+  double focal_scatter(const ChoiceCamera& camera) const {
+    const auto found = std::find(camera.parameters.begin(), camera.parameters.end(), kFocal);
+    if (found == camera.parameters.end()) return 0;
+    const Eigen::Index row = camera.first + (found - camera.parameters.begin());
+    Eigen::VectorXd focal(std::ssize(forms_.without));
+    for (Eigen::Index g = 0; g < focal.size(); ++g)
+      focal[g] = restricted_minimum(forms_.without[static_cast<std::size_t>(g)], free_, start_)[row];
+    const auto n = static_cast<double>(focal.size());
+    return n > 0 ? std::sqrt((n - 1) / n * (focal.array() - focal.mean()).square().sum()) : 0;
   }
 
   std::string reason_of(std::size_t c) const {

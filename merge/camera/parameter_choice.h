@@ -21,6 +21,9 @@
 //   absorbs them distorts the parameters correlated with it, and the poses. Errors of single images cancel each other
 //   less in fewer images, so with n < `groups` images the share is groups / n times as large.
 //
+// But the limit is never more than `certain` standard errors: what all groups of images ask for alike is no chance, and
+// to hold it would bend the poses by more than their sigmas say, however little it is in one image coordinate.
+//
 // So no choice predicts left-out images worse than all parameters would, beyond that limit. How well the block
 // determines a parameter, and with what it is correlated, is part of e_g, because k_g scatters accordingly.
 //
@@ -47,6 +50,7 @@ namespace megablock {
 
 struct ParameterChoiceOptions {
   double least_gain = 0.001;  // share of the squared error of prediction, with `groups` images or more
+  double certain = 4;         // standard errors of the raise beyond which a parameter counts in any case
   int groups = 20;            // of frames, or of tie points, that are left out in turn, at most
   int fewest_images = 4;      // with fewer, groups of tie points are left out
   double weak = 0.5;          // sigma over prior sigma from which the reason says that the prior determines a parameter
@@ -65,8 +69,9 @@ struct CameraChoice {
   std::string reason;  // "estimated: f; cx, cy; k1 (3.1 %); held: k2 (0.02 %); ..."
   // The images contradict the known focal length by more than three sigmas of its prior, which must not pull any more.
   bool focal_contradicted = false;
-  // Of the adjusted sample, pixels. The sigma is a formal one. 0: no image of the camera in the sample.
-  double focal_px = 0, focal_sigma_px = 0;
+  // Of the adjusted sample, pixels. 0: no image of the camera in the sample. The sigma is the larger of the formal one
+  // and `focal_scatter_px`, that from the scatter over the groups.
+  double focal_px = 0, focal_sigma_px = 0, focal_scatter_px = 0;
 };
 
 // The forms of all images and of those without each group, over all rows. Poses and points are at the optimum of the

@@ -85,12 +85,13 @@ std::vector<FrameIndex> frames_of_sample(const Job& job, const Tiles& tiles, con
 }
 
 // Of images of the wrong focal length pairs are lost, and others are verified with a wrong orientation. A tenth does
-// little harm.
+// little harm. A stated focal length must be contradicted more clearly than a guess.
 bool is_wrong(const Camera& camera, const CameraChoice& choice) {
-  constexpr double kHarmless = 0.1, kMostSigma = 0.05;
+  constexpr double kHarmless = 0.1, kMostSigma = 0.1;
   const bool may_change = choice.focal_contradicted || !camera.focal_known;
-  return may_change && contains(choice.estimated, kFocal) && choice.focal_sigma_px <= kMostSigma * choice.focal_px &&
-         std::abs(std::log(choice.focal_px / camera.intrinsics[kFocal])) > kHarmless;
+  const double sigma = choice.focal_sigma_px / choice.focal_px, sigmas = camera.focal_known ? 5 : 3;
+  return may_change && contains(choice.estimated, kFocal) && sigma <= kMostSigma &&
+         std::abs(std::log(choice.focal_px / camera.intrinsics[kFocal])) > std::max(kHarmless, sigmas * sigma);
 }
 
 // What a unit finds for one of its cameras.
