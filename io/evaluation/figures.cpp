@@ -77,13 +77,14 @@ struct Tests {
 };
 
 // Counts the residuals near the limit of screening, which is a length of max_residual_sigmas sigmas. Only blocks with a
-// free datum are counted: no remark needs the number of others, and these may have 10^9 observations.
+// free datum and several tiles are counted: no remark needs the number of others, and these may have 10^9 observations.
 class LimitCounter {
  public:
   explicit LimitCounter(const BlockResult& result) {
     // limit_px_ stays 0, and nothing is counted.
-    if (result.free_parts.empty()) return;
+    if (result.free_parts.empty() || result.tiles.tile_count < 2) return;
     const double sigmas = std::strtod(option_of(result, "adjustment.max_residual_sigmas").c_str(), nullptr);
+    if (sigmas > NearLimit::kWidest) return;
     limit_px_ = sigmas * result.image_sigma_px;
     const auto beyond = [&](double factor) { return std::exp(-0.5 * factor * factor * sigmas * sigmas); };
     found_.expected = beyond(1 - NearLimit::kNear) - beyond(1 + NearLimit::kNear);

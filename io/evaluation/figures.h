@@ -96,6 +96,8 @@ struct Reliability {
 // observations decide whether these take part.
 struct NearLimit {
   static constexpr double kNear = 0.1;  // distance from the limit, as a share of it, to both sides
+  // Sigmas. A wider limit keeps everything but gross errors, and no normal error comes near it.
+  static constexpr double kWidest = 10;
   std::int64_t tested = 0, near = 0;
   // The length of a residual with normal x and y of sigma s exceeds k s with probability exp(-k^2 / 2) (Rayleigh). With
   // the limit at k sigmas, the band holds exp(-(0.9 k)^2 / 2) - exp(-(1.1 k)^2 / 2). Residuals have less than the
@@ -129,7 +131,7 @@ struct Figures {
   IndexedVector<ImageIndex, double> image_squares;           // sum of squared kept residuals, px^2
   IndexedVector<ImageIndex, std::int32_t> measured;          // number of observations in tracks, with rejected ones
   Reliability reliability;                                   // tested = 0: redundancy numbers are unknown
-  NearLimit near_limit;                                      // tested = 0: the limit is unknown, or the datum not free
+  NearLimit near_limit;                                      // tested = 0: nothing depends on it (figures.cpp)
   std::vector<BlockPart> parts;                              // largest first
   IndexedVector<FrameIndex, std::int32_t> part_of_frame;     // row of parts; -1: not oriented
   Spread sigma_east, sigma_north, sigma_up, sigma_rotation;  // frames; metres, radians (largest of the three axes)

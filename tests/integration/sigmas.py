@@ -70,6 +70,7 @@ def main():
         status, plain, scaled = run(folder, "stated", "adjustment:\n  estimate_image_sigma: false\n")
         assert status["image_sigma_px"] == 0.5, status["image_sigma_px"]
         near(status["chi2_per_dof"], (NOISE_PX / 0.5) ** 2, 0.02)
+        assert any(line.startswith("Residuals are 0.") for line in status["remarks"]), status["remarks"]
 
         # The job scales its covariances: 'evaluate' does not scale them again.
         status, once, twice = run(folder, "scaled", "adjustment:\n  estimate_image_sigma: false\n"
@@ -83,8 +84,10 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         megablock("simulate", "--frames", 16, "--noise", NOISE_PX, "--gps-sigma", 0, "-o", folder)
         half = f"adjustment: {{image_sigma_px: {NOISE_PX / 2}, estimate_image_sigma: false}}\n"
-        for settings, many in ("", False), (half, True):
-            status, _, _ = run(folder, "many" if many else "clean", settings)
+        tiles = "tiles: {tile_max_frames: 8}\n"
+        for name, settings, many in ("clean", tiles, False), ("many", tiles + half, True), ("one-tile", half, False):
+            status, _, _ = run(folder, name, settings)
+            assert (status["tiles"] == 1) == (name == "one-tile"), status["tiles"]
             assert any("of the limit of screening" in line for line in status["remarks"]) == many, status["remarks"]
 
     # Redundancy numbers add up to the degrees of freedom, whatever the datum.

@@ -284,7 +284,7 @@ std::vector<std::string> datum_texts(const BlockResult& result, const report::Fi
   return lines;
 }
 
-double chance_of_factor(const ObservationStatistics& statistics) { return 5 / std::sqrt(2 * statistics.redundancy); }
+double chance_of_factor(double redundancy) { return 5 / std::sqrt(2 * redundancy); }
 
 std::vector<std::string> misstated_texts(const BlockResult& result) {
   using enum ObservationKind;
@@ -295,11 +295,13 @@ std::vector<std::string> misstated_texts(const BlockResult& result) {
     const auto kind = static_cast<ObservationKind>(k);
     const ObservationStatistics& s = result.observation_table.kinds[k];
     const double factor = s.sigma_factor();
-    if (kind == kTieImage || kind == kCheckImage || !(factor > std::max(kMisstated, 1 + chance_of_factor(s)))) continue;
+    if (kind == kTieImage || kind == kCheckImage ||
+        !(factor > std::max(kMisstated, 1 + chance_of_factor(s.redundancy))))
+      continue;
     lines.push_back(fmt::format(
         "Residuals of {} ({}) are {:.1f} times as large as the stated sigmas predict: some observations "
         "are wrong, or the sigmas are too small{}",
-        name_of(kind), s.count, factor,
+        name_of(kind), counted(s.count, "observation"), factor,
         !estimated && s.scale > 1 ? fmt::format("; the adjustment used the stated sigmas times {:.1f} ('merge: "
                                                 "{{scale_contradicted_sigmas: false}}' keeps the stated ones)",
                                                 s.scale)
@@ -317,6 +319,27 @@ std::vector<std::string> contradicted_texts(const BlockResult& result, const rep
         contradicted_text(result, figures.attitudes, kHeldAttitudeSigma, "attitudes", kDegreesPerRadian, "degrees")})
     if (!text.empty()) lines.push_back(text);
   return lines;
+}
+
+std::string sigma_naught_text(const BlockResult& result) {
+  // Every real block fails the chi-square test, because its redundancy is high. The line is for readers of sigmas, so
+  // it comes when the factor matters, and chance does not explain it.
+  constexpr double kTooLarge = 1.5, kTooSmall = 0.5;
+  const auto redundancy = static_cast<double>(result.degrees_of_freedom);
+  if (result.degrees_of_freedom <= 0 || !(result.variance_factor > 0)) return "";
+  const double s0 = std::sqrt(result.variance_factor), chance = chance_of_factor(redundancy);
+  const bool large = s0 > std::max(kTooLarge, 1 + chance);
+  if (!large && !(s0 < std::min(kTooSmall, 1 - chance))) return "";
+  const bool held = option_of(result, "adjustment.estimate_image_sigma") == "false";
+  return fmt::format(
+      "Residuals are {:.{}f} times as large as the stated sigmas predict (variance factor {:.3g}, {} degrees of "
+      "freedom{}): {}",
+      s0, large ? 1 : 2, result.variance_factor, result.degrees_of_freedom,
+      held ? fmt::format("; the sigma of tie points is held at {:.2g} px", result.image_sigma_px) : "",
+      result.sigma_scaled ? "the formal sigmas are multiplied by it"
+                          : fmt::format("the formal sigmas are too {} by this factor; 'merge: {{scale_sigma: true}}' "
+                                        "multiplies them by it",
+                                        large ? "small" : "large"));
 }
 
 // Each tile at first decides alone which of its observations take part. Blocks without outliers have at most half as
@@ -350,6 +373,7 @@ std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& 
 std::vector<std::string> remarks(const BlockResult& result, const report::Figures& figures) {
   std::vector<std::string> lines = datum_texts(result, figures);
   for (std::string& text : camera_texts(result)) lines.push_back(std::move(text));
+  if (std::string text = sigma_naught_text(result); !text.empty()) lines.push_back(std::move(text));
   for (std::string& text : misstated_texts(result)) lines.push_back(std::move(text));
   for (std::string& text : contradicted_texts(result, figures)) lines.push_back(std::move(text));
   if (std::string text = position_groups_text(result, figures.positions); !text.empty())

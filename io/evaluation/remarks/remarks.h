@@ -30,13 +30,16 @@ std::vector<std::string> misstated_texts(const BlockResult& result);
 // kinds, which names the worst: "6 of 18 attitudes differ from the block by more than 6 sigmas: DJI_0034.JPG by 178.9
 // degrees, ...". Robust losses give them little weight, so they hardly appear in the statistics of their kind.
 std::vector<std::string> contradicted_texts(const BlockResult& result, const report::Figures& figures);
-// A line if so many tie point observations of a block with a free datum are near the limit of screening that the result
-// depends on the tiles: "359 of 83718 tie point observations (0.43 %) lie within 10 % of the limit of screening, ...".
-// Empty otherwise.
+// A line if sigma naught is far from 1: "Residuals are 2.3 times as large as the stated sigmas predict (variance factor
+// 5.12, 41230 degrees of freedom): ...". Empty otherwise.
+std::string sigma_naught_text(const BlockResult& result);
+// A line if so many tie point observations of a block of several tiles with a free datum are near the limit of
+// screening that the result depends on the tiles: "359 of 83718 tie point observations (0.43 %) lie within 10 % of the
+// limit of screening, ...". Empty otherwise.
 std::string near_limit_text(const BlockResult& result, const report::Figures& figures);
 // The largest difference from one that the factor between shown and stated sigma has by chance: five standard
 // deviations. The factor is sqrt(chi2 / r) with the redundancy r, and its standard deviation is about 1 / sqrt(2 r).
-double chance_of_factor(const ObservationStatistics& statistics);
+double chance_of_factor(double redundancy);
 
 // All remarks of this file and of control_remarks.h, one line each.
 std::vector<std::string> remarks(const BlockResult& result);

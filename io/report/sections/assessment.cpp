@@ -8,6 +8,7 @@
 #include "io/evaluation/remarks/remarks.h"
 #include "io/report/drawing/html.h"
 #include "io/report/sections/sections.h"
+#include "io/result/result_option.h"
 
 namespace megablock::report {
 
@@ -103,15 +104,12 @@ std::string residuals_item(const BlockResult& result, const Figures& f) {
     list += item("look", escape(text) + ": see <a href=\"#observations\">observations</a>.");
   for (const std::string& text : contradicted_texts(result, f)) list += item("look", escape(text) + ".");
   if (const std::string text = near_limit_text(result, f); !text.empty()) list += item("look", escape(text) + ".");
-  if (result.degrees_of_freedom <= 0) return list;
-  const double s0 = std::sqrt(std::max(0.0, result.variance_factor));
-  if (s0 > 1.5)
-    return list + item("look", "Residuals are " + fixed(s0, 1) + " times as large as the stated sigmas predict.");
-  if (s0 < 0.5)
-    return list + item("look", "Residuals are much smaller than the stated sigmas predict (σ₀ " + fixed(s0, 2) + ").");
-  return list.empty() ? item("good", "Residuals agree with their sigmas (σ₀ " + fixed(s0, 2) +
-                                         "; the sigma of tie points is estimated).")
-                      : list;
+  if (const std::string text = sigma_naught_text(result); !text.empty()) list += item("look", escape(text) + ".");
+  if (result.degrees_of_freedom <= 0 || !(result.variance_factor > 0) || !list.empty()) return list;
+  const double s0 = std::sqrt(result.variance_factor);
+  const bool held = option_of(result, "adjustment.estimate_image_sigma") == "false";
+  return item("good", "Residuals agree with their sigmas (σ₀ " + fixed(s0, 2) + "; the sigma of tie points is " +
+                          (held ? "held" : "estimated") + ").");
 }
 
 std::string unused_points_item(const BlockResult& result) {

@@ -18,7 +18,7 @@ namespace {
 // 10 %.
 bool misstated(const ObservationStatistics& statistics) {
   const double factor = statistics.sigma_factor();
-  const double tolerance = std::max(0.1, chance_of_factor(statistics));
+  const double tolerance = std::max(0.1, chance_of_factor(statistics.redundancy));
   return std::isfinite(factor) && std::abs(factor - 1) > tolerance;
 }
 

@@ -152,10 +152,43 @@ TEST(Remarks, ManyMeasurementsNearTheLimitOfScreening) {
                                                "max_residual_sigmas: 1000}'")));
   EXPECT_THAT(report_html(result), HasSubstr("lie within 10 % of the limit of screening"));
   result.provenance.options.back().value = "1000";
-  EXPECT_EQ(said(), "") << "nothing is screened";
+  for (std::size_t o = 0; o < result.kept.size(); o += 500) result.residual_y[o] = 450;
+  EXPECT_EQ(said(), "") << "nothing is screened, and gross errors are near the limit by chance";
   result.provenance.options.back().value = "4";
+  EXPECT_THAT(said(), HasSubstr("of the limit"));
+  result.tiles.tile_count = 1;
+  EXPECT_EQ(said(), "") << "there is no division";
+  result.tiles.tile_count = 4;
   result.free_parts.clear();
   EXPECT_EQ(said(), "") << "positions of frames hide it";
+}
+
+TEST(Remarks, SigmaNaughtThatIsFarFromOne) {
+  BlockResult result = made_up_result(small_block());
+  result.image_sigma_px = 0.13;
+  result.degrees_of_freedom = 41230;
+  result.variance_factor = 2.2;  // 1.48 times
+  EXPECT_EQ(sigma_naught_text(result), "");
+  result.variance_factor = 5.12;
+  result.provenance.options.push_back({"adjustment.estimate_image_sigma", "false", "true"});
+  EXPECT_EQ(sigma_naught_text(result),
+            "Residuals are 2.3 times as large as the stated sigmas predict (variance factor 5.12, 41230 degrees of "
+            "freedom; the sigma of tie points is held at 0.13 px): the formal sigmas are too small by this factor; "
+            "'merge: {scale_sigma: true}' multiplies them by it");
+  EXPECT_THAT(remarks(result), testing::ElementsAre(sigma_naught_text(result)));
+  EXPECT_THAT(report_html(result), HasSubstr("<li class=look>Residuals are 2.3 times as large"));
+  result.sigma_scaled = true;
+  EXPECT_THAT(sigma_naught_text(result), testing::EndsWith("): the formal sigmas are multiplied by it"));
+  result.sigma_scaled = false;
+  result.provenance.options.pop_back();
+  result.variance_factor = 0.04;
+  EXPECT_THAT(sigma_naught_text(result),
+              testing::AllOf(testing::StartsWith("Residuals are 0.20 times as large"),
+                             HasSubstr("41230 degrees of freedom): the formal sigmas are too large by this factor")));
+  result.degrees_of_freedom = 3;
+  EXPECT_EQ(sigma_naught_text(result), "") << "by chance";
+  result.variance_factor = 5.12;
+  EXPECT_EQ(sigma_naught_text(result), "") << "by chance";
 }
 
 TEST(Remarks, KindsThatAreWorseThanStated) {
@@ -164,10 +197,11 @@ TEST(Remarks, KindsThatAreWorseThanStated) {
   ObservationStatistics& attitudes = result.observation_table[ObservationKind::kAttitude];
   attitudes = {54, 31 * 50, 50, 1};  // 5.57 times
   const auto first = [&] { return misstated_texts(result).at(0); };
-  EXPECT_THAT(first(), testing::StartsWith("Residuals of attitude (54) are 5.6 times as large as the stated sigmas"));
+  EXPECT_THAT(first(), testing::StartsWith(
+                           "Residuals of attitude (54 observations) are 5.6 times as large as the stated sigmas"));
   EXPECT_THAT(first(),
               testing::EndsWith("; 'merge: {estimate_sigmas: true}' estimates these sigmas from the residuals"));
-  EXPECT_THAT(report_html(result), HasSubstr("<li class=look>Residuals of attitude (54) are 5.6 times"));
+  EXPECT_THAT(report_html(result), HasSubstr("<li class=look>Residuals of attitude (54 observations) are 5.6 times"));
   EXPECT_EQ(remarks(result).size(), 1u);
   result.provenance.options.push_back({"merge.estimate_sigmas", "true", "false"});
   EXPECT_THAT(first(), testing::EndsWith("; the adjustment used estimated sigmas ('merge: {estimate_sigmas: true}')"));
@@ -176,8 +210,8 @@ TEST(Remarks, KindsThatAreWorseThanStated) {
   attitudes = {3, 6, 1.2, 1};  // 2.2 times, by chance
   EXPECT_TRUE(misstated_texts(result).empty());
   result.observation_table[ObservationKind::kControlHeight] = {20, 900, 9, 1};
-  EXPECT_THAT(first(),
-              testing::AllOf(HasSubstr("control, height (20) are 10.0"), testing::Not(HasSubstr("estimate_sigmas"))));
+  EXPECT_THAT(first(), testing::AllOf(HasSubstr("control, height (20 observations) are 10.0"),
+                                      testing::Not(HasSubstr("estimate_sigmas"))));
 }
 
 TEST(Remarks, PositionsAndAttitudesThatTheBlockContradicts) {
