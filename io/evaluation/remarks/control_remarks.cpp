@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "io/evaluation/used_sigmas.h"
+#include "io/result/result_option.h"
 #include "io/text/counted.h"
 
 namespace megablock {
@@ -40,6 +41,22 @@ std::vector<UnusedPoint> unused_points(const BlockResult& result, PointRole role
   return unused;
 }
 
+namespace {
+
+// Why no mark of a point has a residual. Marks without an intersection have none, although their images are oriented.
+std::string without_residuals(const BlockResult& result, const ControlPoint& point) {
+  std::int64_t marks = 0;
+  for (const auto& mark : point.measurements) {
+    const FrameIndex frame = result.block.images[mark.image].frame;
+    marks += result.state.oriented.contains(frame) && result.state.oriented[frame];
+  }
+  if (marks == 0) return "not seen by an oriented image)";
+  if (marks == 1) return "only 1 mark in an oriented image)";
+  return fmt::format("all {} marks in oriented images rejected)", marks);
+}
+
+}  // namespace
+
 std::string unused_points_text(const BlockResult& result, PointRole role) {
   const std::vector<UnusedPoint> unused = unused_points(result, role);
   if (unused.empty()) return "";
@@ -53,7 +70,7 @@ std::string unused_points_text(const BlockResult& result, PointRole role) {
     // Marks that contradict one another may all be rejected, and the worst need not be the wrong one.
     for (std::size_t m = 0; m < std::min(kMarks, point.marks.size()); ++m)
       text += pixels(point.marks[m].px) + " px in " + result.block.name_of(point.marks[m].image) + ", ";
-    text += point.marks.empty() ? "not seen by an oriented image)" : "rejected)";
+    text += point.marks.empty() ? without_residuals(result, result.block.control_points[point.point]) : "rejected)";
   }
   if (unused.size() > kNamedInLine) text += fmt::format(" and {} more", unused.size() - kNamedInLine);
   return text;
@@ -87,33 +104,86 @@ WrongPoint difference_of(const BlockResult& result, const ControlPoint& given,
   return wrong;
 }
 
-std::string wrong_points_text(const BlockResult& result, PointRole role) {
-  std::vector<WrongPoint> wrong;
-  std::int64_t compared = 0, aside = 0;
+// The points of one role, and those of them that the block contradicts, the worst first.
+struct Comparison {
+  std::vector<WrongPoint> all, wrong;
+  std::int64_t aside = 0;
+};
+
+Comparison compare_points(const BlockResult& result, PointRole role) {
+  Comparison found;
   for (std::size_t p = 0; p < std::min(result.control.size(), result.block.control_points.size()); ++p) {
     const ControlPoint& given = result.block.control_points[p];
     if (given.role != role || !result.control[p].takes_part()) continue;
-    ++compared;
     WrongPoint point = difference_of(result, given, result.control[p]);
     point.aside = std::ranges::binary_search(result.control_aside, static_cast<std::int64_t>(p));
+    found.all.push_back(point);
     if (!point.aside && !(point.sigmas > kContradictedSigmas)) continue;
-    aside += point.aside;
-    wrong.push_back(point);
+    found.aside += point.aside;
+    found.wrong.push_back(point);
   }
+  std::ranges::stable_sort(found.wrong, std::greater(), &WrongPoint::sigmas);
+  return found;
+}
+
+// The number of oriented frames whose position is good enough to show an error of this length in a point.
+std::int64_t positions_that_check(const BlockResult& result, double metres) {
+  constexpr double kShown = 3;  // sigmas
+  if (option_of(result, "adjustment.use_position_priors") == "false") return 0;
+  std::int64_t count = 0;
+  for (FrameIndex f(0); result.state.oriented.contains(f); ++f.value)
+    if (const auto& prior = result.block.frames[f].position_prior; prior && result.state.oriented[f])
+      count += kShown * used_sigma(result, *prior).maxCoeff() < metres;
+  return count;
+}
+
+// Few points bend the block to the wrong one, and the largest difference may be that of a right one. With five points
+// each is checked by the others (docs/guide/reading-the-report.md), and positions check points as points do.
+bool tells_which_is_wrong(const BlockResult& result, const Comparison& control) {
+  constexpr std::int64_t kChecked = 5;
+  return control.wrong.empty() || control.aside > 0 || control.all.size() < 2 ||
+         std::ssize(control.all) + positions_that_check(result, control.wrong.front().metres) >= kChecked;
+}
+
+// "A, B and C"
+std::string names_of(const std::vector<WrongPoint>& points) {
+  std::string text;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    text += (i == 0 ? "" : i + 1 == points.size() ? " and " : ", ") + points[i].point->name;
+  return text;
+}
+
+std::string contradictory_points_text(const Comparison& control) {
+  double metres = 0, worst_px = 0;
+  for (const WrongPoint& point : control.all) {
+    metres = std::max(metres, point.metres);
+    worst_px = std::max(worst_px, point.worst_px);
+  }
+  return fmt::format(
+      "The {} control points contradict each other: they differ from the block by up to {:.{}f} m, more than {:.0f} "
+      "sigmas (their marks fit within {} px), and so few cannot tell which of them is wrong; check the coordinates and "
+      "names of {}",
+      control.all.size(), metres, metres < 10 ? 3 : 1, shown_limit(control.wrong.front().sigmas), pixels(worst_px),
+      names_of(control.all));
+}
+
+// `advised`: whether to ask for a check of these points.
+std::string wrong_points_text(const Comparison& found, PointRole role, bool advised) {
+  const std::vector<WrongPoint>& wrong = found.wrong;
   if (wrong.empty()) return "";
-  std::stable_sort(wrong.begin(), wrong.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
   const bool one = wrong.size() == 1, control = role == PointRole::kControl;
   const char* part = !control ? ""
-                     : aside == std::ssize(wrong)
+                     : found.aside == std::ssize(wrong)
                          ? (one ? " and takes no part" : " and take no part")
                          : (one ? " and has hardly any weight" : " and have hardly any weight");
   std::string text =
-      fmt::format("{} of {} {} differ{} from the block by more than {:.0f} sigmas{}: ", wrong.size(), compared,
+      fmt::format("{} of {} {} differ{} from the block by more than {:.0f} sigmas{}: ", wrong.size(), found.all.size(),
                   control ? "control points" : "check points", one ? "s" : "", shown_limit(wrong.back().sigmas), part);
   for (std::size_t i = 0; i < std::min(kNamedInLine, wrong.size()); ++i)
     text += fmt::format("{}{} by {:.{}f} m (its marks fit within {} px)", i > 0 ? ", " : "", wrong[i].point->name,
                         wrong[i].metres, wrong[i].metres < 10 ? 3 : 1, pixels(wrong[i].worst_px));
   if (wrong.size() > kNamedInLine) text += fmt::format(" and {} more", wrong.size() - kNamedInLine);
+  if (!advised) return text + "; the control points that contradict each other move the block";
   return text + (one ? "; check its coordinates and its name" : "; check their coordinates and names");
 }
 
@@ -146,8 +216,12 @@ std::string rejected_marks_text(const BlockResult& result) {
 
 std::vector<std::string> wrong_control_texts(const BlockResult& result) {
   std::vector<std::string> lines;
-  for (const std::string& text : {wrong_points_text(result, PointRole::kControl),
-                                  wrong_points_text(result, PointRole::kCheck), rejected_marks_text(result)})
+  const Comparison control = compare_points(result, PointRole::kControl);
+  const bool tells = tells_which_is_wrong(result, control);
+  for (const std::string& text :
+       {tells ? wrong_points_text(control, PointRole::kControl, true) : contradictory_points_text(control),
+        wrong_points_text(compare_points(result, PointRole::kCheck), PointRole::kCheck, tells),
+        rejected_marks_text(result)})
     if (!text.empty()) lines.push_back(text);
   return lines;
 }

@@ -32,13 +32,14 @@ struct UnusedPoint {
 // The unused points, worst first. Empty if the result has no points.
 std::vector<UnusedPoint> unused_points(const BlockResult& result, PointRole role);
 
-// "2 control points take no part: 3 (more than 100 000 px in 02.jpg, 31 px in 04.jpg, rejected), 7 (not seen by an oriented
-// image)"; empty if there are none.
+// "2 control points take no part: 3 (more than 100 000 px in 02.jpg, 31 px in 04.jpg, rejected), 7 (not seen by an
+// oriented image)"; empty if there are none.
 std::string unused_points_text(const BlockResult& result, PointRole role);
 
 // The control and check points that the block contradicts, and single marks that were rejected, one line each:
 // "1 of 10 control points differs from the block by more than 6 sigmas and has hardly any weight: gcp02 by 10.0 m (its
 // marks fit within 0.4 px); check its coordinates and its name", "1 mark of control and check points is rejected: gcp05
-// in IMG_0043.JPG by 312 px". A point of which no mark takes part is in unused_points_text.
+// in IMG_0043.JPG by 312 px". Fewer than five control points, without positions that check them, are all named: "The 3
+// control points contradict each other: ...". A point of which no mark takes part is in unused_points_text.
 std::vector<std::string> wrong_control_texts(const BlockResult& result);
 }  // namespace megablock
