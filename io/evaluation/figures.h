@@ -113,6 +113,9 @@ struct BlockPart {
   // Whether observations determine its place in the ground frame; otherwise at least its place or direction is
   // arbitrary.
   bool placed() const { return defect < 3; }
+  // Whether observations determine its scale. Nothing does where place or direction and the scale are free (four), and
+  // where all seven are.
+  bool scaled() const { return defect != 4 && defect < 7; }
 };
 
 struct Figures {

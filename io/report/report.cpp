@@ -69,7 +69,7 @@ std::string page_of(const BlockResult& result, const report::Figures& figures, c
   add(coverage_section(result, figures, context.after_reading));
   add(tie_points_section(result, figures, context.after_reading));
   add(residuals_section(result, figures));
-  if (context.diagnostics) add(diagnostics_section(result, *context.diagnostics));
+  if (context.diagnostics) add(diagnostics_section(result, figures, *context.diagnostics));
   add(images_section(result, figures, context.after_reading));
   add(observations_section(result, figures));
   add(positions_section(result, figures));

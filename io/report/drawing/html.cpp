@@ -116,6 +116,10 @@ LengthUnit length_unit(double largest_m) {
   return {1, "m", largest_m < 10 ? 3 : 2};
 }
 
+LengthUnit length_unit(double largest, const std::string& of_map) {
+  return of_map == "m" ? length_unit(largest) : LengthUnit{1, "units", 5};
+}
+
 std::string in_unit(const std::string& name, const LengthUnit& unit) { return name + " [" + unit.name + "]"; }
 
 double largest(const std::vector<Eigen::Vector3d>& values) {

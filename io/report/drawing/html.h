@@ -26,10 +26,12 @@ std::string memory(double mebibytes);                   // 412 MiB, 2.1 GiB
 // The unit of length in which values up to `largest` metres are easy to read.
 struct LengthUnit {
   double factor;     // value in this unit = value in metres * factor
-  const char* name;  // mm, cm, m
+  const char* name;  // mm, m; units: of an arbitrary scale
   int decimals;
 };
 LengthUnit length_unit(double largest_m);
+// The same for the unit of a map (ground_unit in sections.h), which may be of an arbitrary scale.
+LengthUnit length_unit(double largest, const std::string& of_map);
 
 std::string in_unit(const std::string& name, const LengthUnit& unit);  // "ΔE [mm]"
 double largest(const std::vector<Eigen::Vector3d>& values);            // largest finite |component|; 0 if none

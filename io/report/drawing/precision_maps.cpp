@@ -184,7 +184,7 @@ FieldDrawing draw_ellipses(const BlockResult& result, const FrameSelection& sele
   const double spacing = std::sqrt(kMapWidth * plane->height / static_cast<double>(all.size()));
   const double wanted = std::min(kMapWidth / 28, 0.3 * spacing) / (typical * plane->scale);
   const double exaggeration = step_below(wanted);
-  const LengthUnit unit = length_unit(typical);
+  const LengthUnit unit = length_unit(typical, unit_name);
   const std::size_t step = 1 + all.size() / kEllipses;
   std::string body;
   for (std::size_t i = 0; i < all.size(); i += step) {

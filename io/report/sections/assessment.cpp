@@ -182,7 +182,7 @@ std::string headline(const BlockResult& result, const Figures& f) {
                                                     fixed(result.image_sigma_px, 3) + " px per tie point observation"
                                               : "");
   if (std::isfinite(f.ground_resolution_m)) {
-    const LengthUnit unit = length_unit(f.ground_resolution_m);
+    const LengthUnit unit = length_unit(f.ground_resolution_m, ground_unit(f));
     cards += card(significant(f.ground_resolution_m * unit.factor) + "<i> " + unit.name + "</i>",
                   "per pixel in object space", "median");
   }

@@ -25,7 +25,8 @@ constexpr std::array<const char*, 8> kPartColours = {"#4e79a7", "#f28e2b", "#59a
 
 class DiagnosticsMap {
  public:
-  DiagnosticsMap(const BlockResult& result, const BlockDiagnostics& d) : result_(result), d_(d) {
+  DiagnosticsMap(const BlockResult& result, const BlockDiagnostics& d, const char* unit)
+      : result_(result), d_(d), unit_(unit) {
     std::vector<Eigen::Vector2d> places;
     for (FrameIndex f(0); result.block.frames.contains(f); ++f.value)
       if (oriented(result, f)) places.emplace_back(result.state.frames[f].centre.head<2>());
@@ -40,8 +41,8 @@ class DiagnosticsMap {
 
   std::string svg() const {
     if (!any_) return "";
-    std::string body = coordinate_grid(plane_, "m") + footprints() + thin_ground() + links() + frames() + gaps() +
-                       proposals() + numbers() + scale_bar(plane_, "m");
+    std::string body = coordinate_grid(plane_, unit_) + footprints() + thin_ground() + links() + frames() + gaps() +
+                       proposals() + numbers() + scale_bar(plane_, unit_);
     if (result_.block.ground.georeferenced) body += north_arrow();
     return open_map(plane_, "Gaps and links of the block") + body + "</svg>";
   }
@@ -167,13 +168,15 @@ class DiagnosticsMap {
 
   const BlockResult& result_;
   const BlockDiagnostics& d_;
+  const char* unit_;  // of lengths
   Plane plane_;
   bool any_ = false;
 };
 
 class DiagnosticsText {
  public:
-  DiagnosticsText(const BlockResult& result, const BlockDiagnostics& d) : result_(result), d_(d) {}
+  DiagnosticsText(const BlockResult& result, const BlockDiagnostics& d, const std::string& unit)
+      : result_(result), d_(d), unit_(unit) {}
 
   std::string summary() const {
     std::string list;
@@ -218,10 +221,11 @@ class DiagnosticsText {
           "are searched; footprints, bases, flight lines and proposals need images that look down.",
           "muted");
     return paragraph(
-        fmt::format("{} flight {}; {} m between exposures, {} m between lines, {} m above ground (medians). "
-                    "<code>diagnostics.json</code> lists everything outside the required limits.",
-                    count(d_.lines), d_.lines == 1 ? "line" : "lines", significant(d_.usual_step_m),
-                    significant(d_.line_distance_m), significant(d_.height_m)),
+        fmt::format(
+            "{} flight {}; {} {unit} between exposures, {} {unit} between lines, {} {unit} above ground (medians). "
+            "<code>diagnostics.json</code> lists everything outside the required limits.",
+            count(d_.lines), d_.lines == 1 ? "line" : "lines", significant(d_.usual_step_m),
+            significant(d_.line_distance_m), significant(d_.height_m), fmt::arg("unit", unit_)),
         "muted");
   }
 
@@ -263,7 +267,8 @@ class DiagnosticsText {
     for (const std::int64_t part : d_.part_frames) sum += part;
     return sum;
   }
-  static std::string area_text(double m2) {
+  std::string area_text(double m2) const {
+    if (unit_ != "m") return significant(m2) + " " + unit_ + "²";
     return m2 >= 1e6   ? significant(m2 / 1e6) + " km²"
            : m2 >= 1e4 ? significant(m2 / 1e4) + " ha"
                        : significant(m2) + " m²";
@@ -301,7 +306,7 @@ class DiagnosticsText {
 
   std::string gaps() const {
     if (d_.gaps.empty()) return "";
-    Table table({"gap", "between", "and", "missing", "distance [m]"}, 3);
+    Table table({"gap", "between", "and", "missing", "distance [" + unit_ + "]"}, 3);
     for (std::size_t i = 0; i < std::min(kRowsListed, d_.gaps.size()); ++i) {
       const auto& gap = d_.gaps[i];
       table.add({count(static_cast<std::int64_t>(i) + 1), name(gap.before), name(gap.after),
@@ -332,7 +337,7 @@ class DiagnosticsText {
 
   std::string ground() const {
     if (d_.thin_ground.empty()) return "";
-    Table table({"ground seen by too few images: centre E", "N", "area [m²]"}, 0);
+    Table table({"ground seen by too few images: centre E", "N", "area [" + unit_ + "²]"}, 0);
     std::vector<const BlockDiagnostics::ThinGround*> order;
     for (const auto& ground : d_.thin_ground) order.push_back(&ground);
     std::stable_sort(order.begin(), order.end(), [](auto* a, auto* b) { return a->area_m2 > b->area_m2; });
@@ -342,7 +347,7 @@ class DiagnosticsText {
   }
 
   std::string pairs() const {
-    Table table({"image", "and", "base [m]", "base / height", "overlap"}, 2);
+    Table table({"image", "and", "base [" + unit_ + "]", "base / height", "overlap"}, 2);
     std::size_t all = 0;
     for (const auto& pair : d_.pairs) {
       if (!d_.base_is_outside(pair) && !d_.overlap_is_missing(pair)) continue;
@@ -368,13 +373,14 @@ class DiagnosticsText {
 
   const BlockResult& result_;
   const BlockDiagnostics& d_;
+  const std::string unit_;  // of lengths
 };
 
 }  // namespace
 
-std::string diagnostics_section(const BlockResult& result, const BlockDiagnostics& d) {
-  const DiagnosticsText text(result, d);
-  const DiagnosticsMap map(result, d);
+std::string diagnostics_section(const BlockResult& result, const Figures& f, const BlockDiagnostics& d) {
+  const DiagnosticsText text(result, d, ground_unit(f));
+  const DiagnosticsMap map(result, d, ground_unit(f));
   const std::string drawing = map.svg();
   std::string body = text.summary() + text.scope();
   if (!drawing.empty()) body += map.legend() + figure(drawing, "");

@@ -18,15 +18,20 @@ constexpr std::size_t kOpen = 40;            // a longer table is folded
 // The optional columns that have values in this block.
 struct ImageColumns {
   bool camera, tile, part, records, sigmas;
-  LengthUnit sigma_unit;
+  LengthUnit sigma_unit, place_unit;
 };
 
 ImageColumns columns_of(const BlockResult& result, const Figures& f) {
   double most = 0;
   for (const Spread* s : {&f.sigma_east, &f.sigma_north, &f.sigma_up})
     if (std::isfinite(s->p95)) most = std::max(most, s->p95);
-  return {result.block.cameras.size() > 1, result.tiles.tile_count > 1,        f.parts.size() > 1,
-          !result.image_records.empty(),   std::isfinite(f.sigma_east.median), length_unit(most)};
+  return {result.block.cameras.size() > 1,
+          result.tiles.tile_count > 1,
+          f.parts.size() > 1,
+          !result.image_records.empty(),
+          std::isfinite(f.sigma_east.median),
+          length_unit(most, ground_unit(f)),
+          std::string(ground_unit(f)) == "m" ? LengthUnit{1, "m", 3} : length_unit(0, ground_unit(f))};
 }
 
 Table empty_table(const ImageColumns& columns) {
@@ -36,19 +41,19 @@ Table empty_table(const ImageColumns& columns) {
   if (columns.tile) headings.push_back("tile");
   if (columns.part) headings.push_back("part");
   if (columns.records) headings.insert(headings.end(), {"features", "matched with"});
-  headings.insert(headings.end(),
-                  {"observations", "rejected", "rms [px]", "E [m]", "N [m]", "U [m]", "ω [°]", "φ [°]", "κ [°]"});
+  headings.insert(headings.end(), {"observations", "rejected", "rms [px]"});
+  for (const char* axis : {"E", "N", "U"}) headings.push_back(in_unit(axis, columns.place_unit));
+  headings.insert(headings.end(), {"ω [°]", "φ [°]", "κ [°]"});
   if (columns.sigmas) {
-    for (const char* axis : {"σE", "σN", "σU"})
-      headings.push_back(std::string(axis) + " [" + columns.sigma_unit.name + "]");
+    for (const char* axis : {"σE", "σN", "σU"}) headings.push_back(in_unit(axis, columns.sigma_unit));
     headings.push_back("σ rotation [°]");
   }
   return Table(std::move(headings), texts);
 }
 
-void add_pose(const BlockResult& result, ImageIndex image, std::vector<std::string>& cells) {
+void add_pose(const BlockResult& result, ImageIndex image, const LengthUnit& unit, std::vector<std::string>& cells) {
   const Pose pose = image_pose(result, image);
-  for (const double c : pose.centre) cells.push_back(fixed(c, 3));
+  axes_cells(pose.centre, unit, false, cells);
   const OmegaPhiKappa angles = omega_phi_kappa(pose.rotation);
   for (const double a : {angles.omega, angles.phi, angles.kappa}) cells.push_back(fixed(a * kDegreesPerRadian, 4));
 }
@@ -78,7 +83,7 @@ void add_image(const BlockResult& result, const Figures& f, const ImageColumns& 
   cells.push_back(
       percent(static_cast<double>(f.measured[image] - f.observations[image]), static_cast<double>(f.measured[image])));
   cells.push_back(fixed(image_rms(f, image), 3));
-  add_pose(result, image, cells);
+  add_pose(result, image, columns.place_unit, cells);
   if (columns.sigmas) add_sigmas(result, i.frame, columns.sigma_unit, cells);
   table.add(std::move(cells));
 }
@@ -113,6 +118,7 @@ std::string images_section(const BlockResult& result, const Figures& f, const st
   std::string note =
       "Observations: number of kept ones; rejected: share of all observations in tracks. Positions are those of the "
       "projection centres in the ground frame";
+  if (std::string(ground_unit(f)) != "m") note += ", whose scale is arbitrary";
   note += columns.sigmas ? ", formal sigmas of the frame (rotation: the largest of three axes). " : ". ";
   note += "Click a heading to sort.";
   if (all > static_cast<std::int64_t>(images.size()))

@@ -11,7 +11,7 @@ namespace megablock::report {
 namespace {
 
 constexpr std::size_t kMostMaps = 6;  // largest number of maps of free parts
-constexpr int kScaleFreeDefect = 7;
+constexpr int kAllFree = 7;           // parameters of place, direction and scale
 
 // The frames that one map shows.
 struct MapSubject {
@@ -38,8 +38,8 @@ std::vector<MapSubject> subjects_of(const Figures& f) {
   if (any_placed) subjects.push_back({placed, "m", true, -1});
   for (std::size_t p = 0; p < f.parts.size(); ++p)
     if (!f.parts[p].placed())
-      subjects.push_back({in_part(f, static_cast<std::int32_t>(p)),
-                          f.parts[p].defect >= kScaleFreeDefect ? "units" : "m", false, static_cast<std::int32_t>(p)});
+      subjects.push_back({in_part(f, static_cast<std::int32_t>(p)), f.parts[p].scaled() ? "m" : "units", false,
+                          static_cast<std::int32_t>(p)});
   return subjects;
 }
 
@@ -56,7 +56,7 @@ std::string caption_of(const BlockResult& result, const Figures& f, const MapSub
   return fmt::format(
       "{}{} images. Its datum is free (defect {}): {} arbitrary{}.",
       f.parts.size() > 1 ? "<b>Part " + count(subject.part + 1) + ".</b> " : "", count(part.images), part.defect,
-      part.defect >= kScaleFreeDefect ? "place, direction and scale are" : "part of its place, direction and scale is",
+      part.defect >= kAllFree ? "place, direction and scale are" : "part of its place, direction and scale is",
       f.parts.size() > 1 ? ", also relative to the other parts" : "");
 }
 
@@ -69,6 +69,8 @@ std::string map_controls() {
 }
 
 }  // namespace
+
+const char* ground_unit(const Figures& f) { return f.parts.empty() || f.parts.front().scaled() ? "m" : "units"; }
 
 std::string map_section(const BlockResult& result, const Figures& f, const std::function<void()>& after_reading) {
   std::string body;

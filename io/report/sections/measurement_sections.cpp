@@ -163,7 +163,7 @@ std::string accuracy_section(const BlockResult& result, const Figures& f, const 
   double most = 0;
   for (const Spread* s : {&f.sigma_east, &f.sigma_north, &f.sigma_up, &f.point_sigma_horizontal, &f.point_sigma_up})
     if (std::isfinite(s->p95)) most = std::max(most, s->p95);
-  const LengthUnit unit = length_unit(most);
+  const LengthUnit unit = length_unit(most, ground_unit(f));
   const std::array<double, 4> empirical = empirical_medians(result);
   const bool both = std::isfinite(empirical[0]);
   std::vector<std::string> headings{"formal sigma", "median", "95 %", "largest", "median × σ₀"};

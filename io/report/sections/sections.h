@@ -18,6 +18,9 @@ inline constexpr double kGrossRatio = 3;  // differences of more than so many si
 bool alarms(const SeamCheck& seam);
 double sigmas_apart(const SeamCheck& seam);  // difference of its two sides, over what their sigmas explain
 std::string time_text(double since_1970_s);  // "2026-11-21 10:55 UTC"; empty if unknown
+// The unit of lengths in the ground frame: "m", or "units" where the scale of the largest part of the block is
+// arbitrary.
+const char* ground_unit(const Figures& figures);
 // Empty without covariances. `after_reading` is that of ReportContext, here and below.
 std::string ellipses_figure(const BlockResult& result, const Figures& figures,
                             const std::function<void()>& after_reading);
@@ -32,7 +35,7 @@ std::string map_section(const BlockResult& result, const Figures& figures, const
 std::string coverage_section(const BlockResult& result, const Figures& figures,
                              const std::function<void()>& after_reading);
 // Gaps, thin ground, bases and weak links (io/block/block_diagnostics.h).
-std::string diagnostics_section(const BlockResult& result, const BlockDiagnostics& diagnostics);
+std::string diagnostics_section(const BlockResult& result, const Figures& figures, const BlockDiagnostics& diagnostics);
 std::string images_section(const BlockResult& result, const Figures& figures,
                            const std::function<void()>& after_reading);
 // Histograms of track lengths, intersection angles and observations per image.

@@ -212,6 +212,39 @@ TEST(Report, PartsWithoutADatumHaveMapsOfTheirOwn) {
   EXPECT_THAT(free, Not(HasSubstr(" km</text>")));  // a free scale is not in metres
 }
 
+TEST(Report, LengthsOfAnArbitraryScaleAreNotMetres) {
+  BlockResult result = made_up_result(small_block());
+  BlockDiagnostics diagnostics;
+  diagnostics.gaps.push_back({false, FrameIndex(1), FrameIndex(2), {0, 0}, {6, 0}, 1, 6.25});
+  ReportContext context;
+  context.diagnostics = &diagnostics;
+  const auto metric = testing::AnyOf(HasSubstr("E [m]"), HasSubstr("E [mm]"), HasSubstr("east [mm]"),
+                                     HasSubstr("distance [m]"), HasSubstr("E, N [m]"));
+  const auto in_sections = [&] {  // residuals of positions and control stay in metres
+    std::string page = report_html(result, context), kept;
+    expect_sound(page);
+    for (const char* id : {"map-section", "coverage", "diagnostics", "images", "accuracy"}) {
+      const std::size_t at = page.find("<section id=\"" + std::string(id) + "\"");
+      EXPECT_NE(at, std::string::npos) << id;
+      if (at != std::string::npos) kept += page.substr(at, page.find("</section>", at) - at);
+    }
+    return kept + page.substr(page.find("<div class=cards>"),
+                              page.find("per pixel in object space") - page.find("<div class=cards>"));
+  };
+  EXPECT_THAT(in_sections(), testing::AllOf(HasSubstr("E [m]"), HasSubstr("σE [mm]"), HasSubstr("distance [m]"),
+                                            Not(HasSubstr("units]")), Not(HasSubstr("<i> units</i>"))));
+  for (const std::int32_t defect : {4, 7}) {
+    result.free_parts = {{FrameIndex(0), defect}};
+    EXPECT_THAT(in_sections(),
+                testing::AllOf(HasSubstr("<i> units</i>"), HasSubstr("E [units]"), HasSubstr("σE [units]"),
+                               HasSubstr("frames, east [units]"), HasSubstr("distance [units]"),
+                               HasSubstr("whose scale is arbitrary"), Not(metric)))
+        << defect;
+  }
+  result.free_parts = {{FrameIndex(0), 1}};  // a rotation about a line
+  EXPECT_THAT(in_sections(), Not(HasSubstr("units]")));
+}
+
 TEST(Report, JointsThatShareNothingAreNotGood) {
   BlockResult result = made_up_result(small_block());
   result.seams = {{4, 0, 0, 0, ""}};
