@@ -296,7 +296,10 @@ void add_report(CLI::App& app, Action& action) {
 }
 
 int print_split_test(const RunOptions& run, const SplitTestOptions& test, bool json, Communicator& ranks) {
-  on_first_rank(ranks, [&] { return finished_result(run.directory); });
+  on_first_rank(ranks, [&] {
+    require_halves(read_result_without_tracks(finished_result(run.directory)));
+    return std::string();
+  });
   const HalvesComparison halves = run_split_test(run, test, ranks);
   if (ranks.rank() == 0) std::printf("%s\n", (json ? to_json(halves) : to_text(halves)).c_str());
   return kExitDone;
@@ -315,7 +318,8 @@ void add_evaluate(CLI::App& app, Action& action, Communicator& ranks) {
   CLI::App* command = app.add_subcommand("evaluate", "Compare a job with known poses, or halves of it with each other");
   command->footer("Example: megablock evaluate job truth.csv --json\n         megablock evaluate job --halves");
   command->add_option("job", options->run.directory, "Job directory")->required();
-  auto* truth = command->add_option("truth", options->truth, "Poses: truth.csv of 'simulate', or any pose CSV");
+  auto* truth = command->add_option("truth", options->truth,
+                                    "Poses: truth.csv of 'simulate', or a CSV file name,qw,qx,qy,qz,x,y,z");
   command
       ->add_flag(
           "--halves", options->halves,
@@ -337,6 +341,7 @@ void add_evaluate(CLI::App& app, Action& action, Communicator& ranks) {
   command->add_flag("--scale-sigma", options->evaluation.scale_sigma,
                     "Multiply the posterior sigmas by the a-posteriori sigma");
   command->add_flag("--json", options->json, "Figures as JSON");
+  command->add_flag("-q,--quiet", options->test.quiet, "No line for each half");
   command->callback([=, &action, &ranks] {
     if (options->truth.empty() && !options->halves)
       throw CLI::ValidationError("evaluate", "give known poses, or --halves");

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cstdlib>
+#include <string_view>
 #include <thread>
 
 #include "cluster/process/exit_codes.h"
@@ -16,15 +17,15 @@ namespace {
 
 // A signal concerns the whole process, so that its flags cannot be local.
 struct Flags {
-  std::atomic<bool> stop{false}, end_of_work{false};
+  std::atomic<bool> stop{false}, begins_anew{false}, end_of_work{false};
 };
 Flags& flags() {
   static Flags flags;
   return flags;
 }
 
-void write_line(const char* text, std::size_t size) {
-  if (::write(STDERR_FILENO, text, size) < 0) {
+void write_line(std::string_view text) {
+  if (::write(STDERR_FILENO, text.data(), text.size()) < 0) {
     // Nothing is left to do: the terminal is gone, and the process ends.
   }
 }
@@ -44,10 +45,11 @@ void watch_signals() {
         flags().stop = true;
         continue;
       }
-      constexpr char kText[] = "megablock: stopped; the units in hand are abandoned, run the same command to resume\n";
       if (!flags().end_of_work) {
         end_progress_line();
-        write_line(kText, sizeof kText - 1);
+        write_line(flags().begins_anew
+                       ? "megablock: stopped; the same command begins anew\n"
+                       : "megablock: stopped; the units in hand are abandoned, run the same command to resume\n");
       }
       std::_Exit(kExitInterrupted);
     }
@@ -55,6 +57,7 @@ void watch_signals() {
 }
 
 bool stop_requested() { return flags().stop; }
+void work_begins_anew() { flags().begins_anew = true; }
 void end_of_work() { flags().end_of_work = true; }
 
 }  // namespace megablock

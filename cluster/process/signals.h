@@ -14,6 +14,9 @@ void watch_signals();
 // True after SIGUSR1.
 bool stop_requested();
 
+// Call it before work that the same command does not resume: the message of SIGTERM and SIGINT says so.
+void work_begins_anew();
+
 // Call it when all ranks have finished. mpirun sends SIGTERM to the other ranks when one has ended with an exit code;
 // the signal then still ends the process, but without a message.
 void end_of_work();

@@ -1,10 +1,15 @@
 #include "cluster/stages/split_test.h"
 
+#include <fmt/core.h>
+
+#include <cstdio>
 #include <filesystem>
 #include <vector>
 
 #include "cluster/job/job_json.h"
 #include "cluster/mpi/collective.h"
+#include "cluster/process/progress.h"
+#include "cluster/process/signals.h"
 #include "cluster/stages/pipeline.h"
 #include "io/base/error.h"
 #include "io/store/job/job_store.h"
@@ -58,6 +63,45 @@ void adjust_half(RunOptions options, const HalfChoice& choice, Communicator& ran
   run_job(options, ranks);
 }
 
+// "tie points, half 1, division 3 of 16"
+std::string name_of(const HalfChoice& choice, std::int64_t divisions) {
+  const bool first = choice.half == Half::kTiePoints1 || choice.half == Half::kImages1;
+  if (choice.half == Half::kImages1 || choice.half == Half::kImages2)
+    return fmt::format("images, half {}", first ? 1 : 2);
+  return fmt::format("tie points, half {}, division {} of {}", first ? 1 : 2, choice.division + 1, divisions);
+}
+
+// Adjusts the halves one by one with a line for each. The messages of a job are those of a command that resumes it.
+class Halves {
+ public:
+  Halves(const RunOptions& options, const SplitTestOptions& test, std::int64_t divisions, Communicator& ranks)
+      : options_(options), ranks_(ranks), divisions_(divisions), quiet_(test.quiet) {}
+
+  void adjust(const HalfChoice& choice) {
+    const std::string name = name_of(choice, divisions_);
+    ++number_;
+    if (!quiet_ && ranks_.rank() == 0) {
+      end_progress_line();
+      std::fprintf(stderr, "%-12s %s\n", fmt::format("{}/{}", number_, 2 * divisions_ + 2).c_str(), name.c_str());
+    }
+    try {
+      adjust_half(options_, choice, ranks_);
+    } catch (const AgreedError<Interrupted>&) {
+      throw AgreedError<Interrupted>("stopped as asked; the same command begins anew");
+    } catch (const AgreedError<ComputeError>& error) {
+      throw AgreedError<InputError>(
+          name + ": the block has too few images or tie points to be divided, for this half gives no block (" +
+          error.what() + "); compare the job with known poses ('megablock evaluate JOB POSES') or check points");
+    }
+  }
+
+ private:
+  const RunOptions& options_;
+  Communicator& ranks_;
+  std::int64_t divisions_, number_ = 0;
+  bool quiet_;
+};
+
 BlockResult result_of(const std::string& job, Half half) {
   const JobStore store(folder_of(job, half));
   if (!store.seal(kResult))
@@ -81,15 +125,17 @@ HalvesComparison run_split_test(const RunOptions& options, const SplitTestOption
   test.check();
   const std::string& job = options.directory;
   const std::int64_t count = test.divisions > 0 ? test.divisions : divisions_for(JobStore(job));
+  work_begins_anew();
+  Halves halves(options, test, count, ranks);
   std::vector<HalvesComparison> divisions;  // on the first rank
   for (std::int64_t division = 0; division < count; ++division) {
-    for (const Half half : {Half::kTiePoints1, Half::kTiePoints2}) adjust_half(options, {half, division}, ranks);
+    for (const Half half : {Half::kTiePoints1, Half::kTiePoints2}) halves.adjust({half, division});
     on_first_rank(ranks, [&] {
       divisions.push_back(compare_halves(result_of(job, Half::kTiePoints1), result_of(job, Half::kTiePoints2)));
       return std::string();
     });
   }
-  for (const Half half : {Half::kImages1, Half::kImages2}) adjust_half(options, {half, 0}, ranks);
+  for (const Half half : {Half::kImages1, Half::kImages2}) halves.adjust({half, 0});
   HalvesComparison comparison;
   on_first_rank(ranks, [&] {
     comparison = mean_of(divisions);

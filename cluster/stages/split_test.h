@@ -18,6 +18,7 @@ struct SplitTestOptions {
   // Divisions of the tie points, each with two adjustments. The figures are those of all of them together. 0: 16 for up
   // to 50 images, where one division leaves much to chance, else 4.
   std::int64_t divisions = 0;
+  bool quiet = false;  // no line for each half
   void check() const;  // throws InputError
 };
 

@@ -18,6 +18,8 @@ namespace megablock {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kInsteadOfHalves =
+    "; compare it with known poses ('megablock evaluate JOB POSES') or check points";
 
 // Sums d'C^-1 d over differences. One whose covariance is not positive definite is held in both halves, and is left
 // out.
@@ -87,8 +89,9 @@ CommonFrames common_frames(const BlockResult& first, const BlockResult& second, 
   for (FrameIndex f(0); first.block.frames.contains(f); ++f.value)
     if (first.state.oriented[f] && second.state.oriented[f]) common.frames.push_back(f);
   if (common.frames.size() < 3)
-    throw InputError("the two halves have " + std::to_string(common.frames.size()) +
-                     " images in common: the block has too few tie points to be divided");
+    throw InputError("the two halves have " + counted(std::ssize(common.frames), "oriented image") +
+                     " in common, and a comparison needs 3: the block has too few tie points to be divided" +
+                     kInsteadOfHalves);
   if (aligned) {
     std::vector<Pose> from, to;
     for (const FrameIndex f : common.frames) {
@@ -163,6 +166,16 @@ std::vector<CameraDifference> compare_cameras(const BlockResult& first, const Bl
     cameras.push_back(std::move(camera));
   }
   return cameras;
+}
+
+void require_halves(const BlockResult& result) {
+  constexpr std::int64_t kNeeded = 4;
+  const std::int64_t oriented = std::ranges::count_if(result.state.oriented, [](auto value) { return value != 0; });
+  if (oriented >= kNeeded) return;
+  throw InputError(
+      fmt::format("halves need {} oriented images, and more if few tie points connect them; the block has "
+                  "{}{}",
+                  kNeeded, oriented, kInsteadOfHalves));
 }
 
 HalvesComparison compare_halves(const BlockResult& first, const BlockResult& second) {

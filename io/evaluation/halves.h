@@ -57,6 +57,10 @@ struct HalvesComparison {
   std::string note;                                 // what is wrong with the ratios; empty: nothing
 };
 
+// Throws InputError where the oriented images of a result are too few for halves: halves of the tie points are compared
+// over three common ones, and each half of the images needs two.
+void require_halves(const BlockResult& result);
+
 // Frames, points and cameras of two halves of the tie points. Throws InputError where they have fewer than three frames
 // in common.
 HalvesComparison compare_halves(const BlockResult& first, const BlockResult& second);

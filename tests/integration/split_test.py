@@ -4,10 +4,12 @@ in one tile and in several; the job stays as it was. usage: split_test.py MEGABL
 import json
 import math
 import pathlib
+import re
+import subprocess
 import sys
 import tempfile
 
-from program import BAD_INPUT, megablock
+from program import BAD_INPUT, MEGABLOCK, megablock, one_line
 
 SEEDS = int(sys.argv[1]) if len(sys.argv) > 1 else 6  # program.py has taken the program
 FIGURES = [(kind, sigma) for kind in ("positions", "rotations", "cameras") for sigma in ("formal", "empirical")]
@@ -32,7 +34,7 @@ def main():
                 job = block / "job"
                 megablock("run", block / "block.yaml", "-j", job, "-q")
                 digest = megablock("status", job, "--digest")
-                text = megablock("evaluate", job, "--halves", "--divisions", 4, "--json")
+                text = megablock("evaluate", job, "--halves", "--divisions", 4, "--json", "-q")
                 halves = json.loads(text)
                 # An image at the edge may see only tracks that begin in images of one half.
                 assert halves["aligned"] == (gps == 0) and halves["frames_missing"] <= 2, halves
@@ -51,6 +53,17 @@ def main():
                 wrong.append(key)
         assert not wrong, wrong
         assert "--halves" in megablock("evaluate", job, expect=BAD_INPUT)
+        text = megablock("evaluate", job, "--halves", "--divisions", 1)
+        for line in "1/4          tie points, half 1, division 1 of 1", "4/4          images, half 2":
+            assert line in text.splitlines(), text
+        for frames in 2, 3:
+            block = folder / f"{frames}"
+            megablock("simulate", "--frames", frames, "--points-per-frame", 150, "-o", block)
+            # The adjustment of so small a block may not converge, which does not matter here.
+            subprocess.run([MEGABLOCK, "run", block / "block.yaml", "-j", block / "job", "-q"], capture_output=True)
+            said = one_line(megablock("evaluate", block / "job", "--halves", expect=BAD_INPUT))
+            assert re.search(f"halves need 4 oriented images.* has {frames}; compare it with known poses", said), said
+            assert not (block / "job/halves").exists()
 
 
 main()

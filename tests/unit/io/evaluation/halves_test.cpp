@@ -54,6 +54,21 @@ class HalvesTest : public testing::Test {
   SimulatedBlock simulated_;
 };
 
+TEST_F(HalvesTest, FourOrientedImagesCanBeDivided) {
+  BlockResult divided = result(1, 1);
+  for (std::size_t f = 4; f < kFrames; ++f) divided.state.oriented[FrameIndex(static_cast<std::int64_t>(f))] = 0;
+  EXPECT_NO_THROW(require_halves(divided));
+  divided.state.oriented[FrameIndex(2)] = 0;
+  try {
+    require_halves(divided);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_EQ(std::string(error.what()),
+              "halves need 4 oriented images, and more if few tie points connect them; the block has 3; compare it "
+              "with known poses ('megablock evaluate JOB POSES') or check points");
+  }
+}
+
 TEST_F(HalvesTest, TrueSigmasGiveOne) {
   const HalvesComparison halves = compare_halves(result(1, 1), result(2, 1));
   EXPECT_FALSE(halves.aligned);
