@@ -153,6 +153,9 @@ std::string to_json(const BlockDiagnostics& diagnostics, const Block& block) {
 }
 
 std::string to_text(const BlockDiagnostics& d, const Block& block) {
+  if (d.frames == 0)
+    return "nothing could be examined, because no image has a pose: run the job as far as its initial orientation "
+           "('megablock orient'), or give poses, or positions with attitudes\n";
   std::string text;
   const auto between = [&](const auto& a, const auto& b) {
     return "'" + block.frames[a].name + "' and '" + block.frames[b].name + "'";

@@ -31,6 +31,7 @@ struct BlockDiagnostics {
   // In an aerial block most images look down. Only such blocks have footprints, bases, flight lines, ground and
   // proposals. In others, above all facades along streets, only interruptions of passes and links have a meaning.
   bool aerial = false;
+  std::int64_t frames = 0;            // with a pose; others are not examined
   bool links_known = false;           // there are tie points or matches
   double usual_step_m = kUnknown;     // between successive exposures, median
   double line_distance_m = kUnknown;  // between neighbouring flight lines, median
@@ -105,7 +106,7 @@ struct BlockDiagnostics {
 // One JSON object, as described in docs/reference/file-formats.md. Positions are in the block's frame, and in
 // georeferenced blocks also as latitude and longitude.
 std::string to_json(const BlockDiagnostics& diagnostics, const Block& block);
-// The same in a few lines of text. Lines at the end name what could not be examined.
+// The same in a few lines of text. Lines at the end name what could not be examined; without a pose that is everything.
 std::string to_text(const BlockDiagnostics& diagnostics, const Block& block);
 // "6 frames ('a', 'b', 'c' and 3 more) share only 'd' with the rest of the block, ...". Without a full stop.
 std::string loose_part_text(const BlockDiagnostics::LoosePart& part, const BlockDiagnostics& diagnostics,

@@ -48,6 +48,7 @@ class Diagnosis {
   }
 
   BlockDiagnostics find(const std::function<TieEvidence(bool)>& gather) {
+    found_.frames = std::ranges::count_if(state_.oriented, [](auto oriented) { return oriented != 0; });
     // Ground heights come from tie points, so in aerial blocks these are collected first.
     found_.aerial = looks_down();
     if (found_.aerial) ties_ = gather(true);

@@ -314,6 +314,18 @@ TEST(BlockDiagnostics, OfImagesAloneNobodyKnowsWhereDownIs) {
   EXPECT_TRUE(found().aerial);
 }
 
+// Tie points alone show no weakness either.
+TEST(BlockDiagnostics, WithoutPosesNothingIsExamined) {
+  Survey survey;
+  for (int i = 0; i < 4; ++i) survey.add(16 * i, 0, 0, 0, false);
+  for (int i = 0; i < 3; ++i) survey.link(FrameIndex(i), FrameIndex(i + 1), 100);
+  EXPECT_EQ(to_text(survey.found(), survey.block).find("nothing could be examined"), std::string::npos);
+  for (Frame& frame : survey.block.frames) frame.given_pose.reset();
+  EXPECT_EQ(to_text(survey.found(), survey.block),
+            "nothing could be examined, because no image has a pose: run the job as far as its initial orientation "
+            "('megablock orient'), or give poses, or positions with attitudes\n");
+}
+
 TEST(BlockDiagnostics, NothingPlacedAndBadOptions) {
   Survey survey;
   const BlockDiagnostics empty = survey.found();
