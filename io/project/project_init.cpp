@@ -189,6 +189,7 @@ std::string init_project(const InitOptions& options) {
   std::error_code error;
   if (!fs::is_directory(options.images, error))
     throw InputError("'" + options.images + "' is not a folder that can be read; give the folder of the images");
+  check_parent(options.output);
   const fs::path output = fs::absolute(options.output).lexically_normal();
   if (fs::exists(output, error))
     throw InputError("'" + options.output + "' exists already; remove it or choose another name with -o");
