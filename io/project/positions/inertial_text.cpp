@@ -31,10 +31,20 @@ struct InertialHeader {
 // Text exports have blanks or commas throughout; blanks stand beside commas in some.
 std::vector<std::string> inertial_fields(const std::string& line) { return split_fields(line, separator_of(line)); }
 
+// The line under the names may state their units: "(sec) (deg) (deg) (ft)". They are joined to the names.
+void join_units(const PositionText& text, std::size_t line, std::vector<std::string>& names) {
+  if (line >= text.lines.size()) return;
+  const std::vector<std::string> units = inertial_fields(text.lines[line].text);
+  if (units.size() != names.size()) return;
+  if (!std::ranges::all_of(units, [](const std::string& unit) { return unit.starts_with('('); })) return;
+  for (std::size_t c = 0; c < names.size(); ++c) names[c] += units[c];
+}
+
 InertialHeader inertial_header(const PositionText& text) {
   constexpr std::size_t kLongestPreamble = 100;  // lines
   for (std::size_t l = 0; l < std::min(text.lines.size(), kLongestPreamble); ++l) {
-    const std::vector<std::string> names = inertial_fields(text.lines[l].text);
+    std::vector<std::string> names = inertial_fields(text.lines[l].text);
+    join_units(text, l + 1, names);
     InertialHeader header{PositionColumns(names), l, names.size()};
     if (header.columns.has("time") && header.columns.has_place() && !header.columns.has("image")) return header;
   }
@@ -71,6 +81,8 @@ PositionTable read_inertial(const PositionText& text, const PositionOptions& opt
     const auto row = header.columns.row(fields, separator_of(line.text), text.where(line), options.angles);
     if (row) table.rows.push_back(*row);
   }
+  header.columns.fit_to_system(options.crs.empty() ? table.crs : options.crs, text.path,
+                               text.where(text.lines[header.line]), table.rows);
   return table;
 }
 

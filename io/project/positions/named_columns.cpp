@@ -66,8 +66,10 @@ std::string crs_of_columns(const PositionText& text) {
 
 PositionTable read_columns(const PositionText& text, const PositionOptions& options) {
   ColumnHeader header = column_header(text);
-  for (const auto& [field, value] : options.columns)
-    header.columns.set(field, column_of(header, field, value, text.path));
+  for (const auto& [field, value] : options.columns) {
+    const std::size_t column = column_of(header, field, value, text.path);
+    header.columns.set(field, column, column < header.names.size() ? header.names[column] : "");
+  }
   if (!names_rows(header.columns))
     throw InputError(text.where(text.lines[header.line]) +
                      ": the header names no columns of image (or time) and position; name them in the project file: "
@@ -98,6 +100,8 @@ PositionTable read_columns(const PositionText& text, const PositionOptions& opti
                                         options.angles);
     if (row) table.rows.push_back(*row);
   }
+  header.columns.fit_to_system(options.crs.empty() ? table.crs : options.crs, text.path,
+                               text.where(text.lines[header.line]), table.rows);
   return table;
 }
 

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/base/error.h"
 #include "io/project/positions/position_fields.h"
+#include "io/project/positions/row_pose.h"
 #include "io/text/plausible.h"
 #include "io/text/settings_reader.h"
 
@@ -90,24 +92,19 @@ const std::vector<Synonyms>& synonyms() {
   return all;
 }
 
-std::string comparable_name(const std::string& name) {
-  std::string result;
-  int depth = 0;
-  for (const char c : lower_case(name)) {
-    if (c == '(' || c == '[') ++depth;
-    const bool word = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
-    if (depth == 0) {
-      if (word)
-        result += c;
-      else if (!result.empty() && result.back() != '_')
-        result += '_';
-    }
-    if (c == ')' || c == ']') --depth;
-  }
-  while (!result.empty() && result.back() == '_') result.pop_back();
-  for (const std::string ending : {"_m", "_deg", "_meter", "_degrees"})
-    if (result.ends_with(ending)) result.resize(result.size() - ending.size());
-  return result;
+constexpr const char* kLengths[] = {"height", "z", "sigma_horizontal", "sigma_x", "sigma_y", "sigma_vertical", "sigma"};
+constexpr const char* kAngles[] = {"latitude",   "longitude",      "yaw",         "pitch",       "roll",
+                                   "gimbal_yaw", "gimbal_pitch",   "gimbal_roll", "omega",       "phi",
+                                   "kappa",      "sigma_rotation", "sigma_roll",  "sigma_pitch", "sigma_heading"};
+
+bool is_one_of(const auto& fields, const std::string& field) {
+  return std::ranges::any_of(fields, [&](const char* name) { return field == name; });
+}
+
+// Whether values of a field may have a unit. Names that state metres or degrees are never refused.
+bool fits(const std::string& field, const ColumnUnit& unit) {
+  if (unit.factor == 1 || field == "x" || field == "y") return true;
+  return unit.kind == ColumnUnit::Kind::kLength ? is_one_of(kLengths, field) : is_one_of(kAngles, field);
 }
 
 struct AngleFields {
@@ -121,15 +118,51 @@ constexpr AngleFields kAngleFields[] = {{"omega", "phi", "kappa", AngleKind::kOm
 }  // namespace
 
 PositionColumns::PositionColumns(const std::vector<std::string>& header) {
-  std::vector<std::string> names;
-  for (const std::string& name : header) names.push_back(comparable_name(name));
+  std::vector<ColumnName> names;
+  for (const std::string& name : header) names.push_back(column_name(name));
+  // Where two columns state a value in two units, metres and degrees count before others.
+  const auto find = [&](const std::string& field, const std::string& name) {
+    std::optional<std::size_t> found;
+    for (std::size_t c = 0; c < names.size(); ++c) {
+      if (names[c].name != name || !fits(field, names[c].unit)) continue;
+      if (names[c].unit.factor == 1) return std::optional(c);
+      if (!found) found = c;
+    }
+    return found;
+  };
   for (const Synonyms& field : synonyms())
     for (const char* name : field.names) {
-      const auto found = std::find(names.begin(), names.end(), name);
-      if (found == names.end()) continue;
-      place_.emplace(field.field, static_cast<std::size_t>(found - names.begin()));
+      const auto found = find(field.field, name);
+      if (!found) continue;
+      set(field.field, *found, header[*found]);
       break;
     }
+}
+
+void PositionColumns::set(const std::string& field, std::size_t column, const std::string& header) {
+  const ColumnUnit unit = column_name(header).unit;
+  place_[field] = {column, fits(field, unit) ? unit : ColumnUnit(), header};
+}
+
+void PositionColumns::fit_to_system(const std::string& crs, const std::string& path, const std::string& where,
+                                    std::vector<PositionTable::Row>& rows) const {
+  const auto height = place_.find(height_field());
+  const bool other_height = height != place_.end() && height->second.unit.factor != 1;
+  const Column* other = nullptr;  // the first of x and y in another unit
+  for (const char* field : {"y", "x"})
+    if (!geodetic() && has(field) && place_.at(field).unit.factor != 1) other = &place_.at(field);
+  if (rows.empty() || (!other && !other_height)) return;
+  const SystemOfTable system(crs, path);
+  const Eigen::Vector2d unit_m = system.metres_per_unit(rows[0].place);
+  const auto same = [](double a, double b, double share) { return std::abs(a / b - 1) < share; };
+  // A grid is up to a few per cent longer or shorter than the ground.
+  constexpr double kScale = 0.1, kHeightScale = 0.01;
+  if (other && !(other->unit.kind == ColumnUnit::Kind::kLength && same(unit_m.x(), other->unit.factor, kScale)))
+    throw InputError(where + ": column '" + other->header + "' is in " + other->unit.text +
+                     ", and the coordinate reference system '" + crs +
+                     "' is not; name a system in this unit with 'crs', or convert the coordinates to metres");
+  if (other_height && same(unit_m.y(), height->second.unit.factor, kHeightScale))
+    for (PositionTable::Row& row : rows) row.place.z() /= height->second.unit.factor;
 }
 
 bool PositionColumns::has_sigmas() const { return has("sigma") || has("sigma_x") || has("sigma_horizontal"); }
@@ -152,21 +185,33 @@ std::string PositionColumns::fields() {
 
 // The texts of a line by field.
 struct PositionColumns::Texts {
-  const std::map<std::string, std::size_t>& place;
+  const std::map<std::string, Column>& place;
   const std::vector<std::string>& fields;
   Separator separator;
   const std::string& where;
 
   std::string text(const char* field) const {
     const auto found = place.find(field);
-    return found == place.end() || found->second >= fields.size() ? std::string() : fields[found->second];
+    return found == place.end() || found->second.at >= fields.size() ? std::string() : fields[found->second.at];
+  }
+  double factor(const char* field) const {
+    const auto found = place.find(field);
+    return found == place.end() ? 1 : found->second.unit.factor;
   }
   bool given(std::initializer_list<const char*> names) const {
     return std::ranges::none_of(names, [&](const char* name) { return text(name).empty(); });
   }
-  double number(const char* field) const { return position_number(text(field), separator, field, where); }
-  double sigma_m(const char* field) const { return position_sigma_m(text(field), separator, field, where); }
-  double sigma_deg(const char* field) const { return position_sigma_deg(text(field), separator, field, where); }
+  double coordinate(const char* field) const { return position_number(text(field), separator, field, where); }
+  double degrees(const char* field) const {
+    return factor(field) * position_degrees(text(field), separator, field, where);
+  }
+  double number(const char* field) const { return factor(field) * coordinate(field); }
+  double sigma_m(const char* field) const {
+    return factor(field) * position_sigma_m(text(field), separator, field, where);
+  }
+  double sigma_deg(const char* field) const {
+    return factor(field) * position_sigma_deg(text(field), separator, field, where);
+  }
 };
 
 void PositionColumns::set_sigmas(const Texts& of, PositionTable::Row& row) {
@@ -216,13 +261,12 @@ std::optional<PositionTable::Row> PositionColumns::row(const std::vector<std::st
   const std::string first = of.text(degrees ? "longitude" : "x"), second = of.text(degrees ? "latitude" : "y");
   if ((row.image.empty() && of.text("time").empty()) || first.empty() || second.empty()) return std::nullopt;
   if (degrees)
-    row.place.head<2>() = Eigen::Vector2d(position_degrees(first, separator, "longitude", where),
-                                          position_degrees(second, separator, "latitude", where));
+    row.place.head<2>() = Eigen::Vector2d(of.degrees("longitude"), of.degrees("latitude"));
   else
-    row.place.head<2>() = Eigen::Vector2d(of.number("x"), of.number("y"));
-  const std::string height = has("height") ? of.text("height") : of.text("z");
+    row.place.head<2>() = Eigen::Vector2d(of.coordinate("x"), of.coordinate("y"));
+  const std::string height = of.text(height_field());
   if (!height.empty() && lower_case(height) != "nan")
-    row.place.z() = position_number(height, separator, "height", where);
+    row.place.z() = of.factor(height_field()) * position_number(height, separator, "height", where);
   set_time(of, row);
   set_sigmas(of, row);
   set_attitude(of, other, row);

@@ -14,13 +14,15 @@
 //     pass                                        number of the drive or flight line
 //
 // A name of a column is compared in lower case, without units in brackets, with '_' for everything that is no letter or
-// digit, and without the ending _m or _deg.
+// digit, and without the ending _m or _deg. Other units of heights, sigmas and angles (column_units.h) are converted.
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "io/project/positions/column_units.h"
 #include "io/project/positions/position_table.h"
 #include "io/text/text_lines.h"
 
@@ -37,7 +39,12 @@ class PositionColumns {
   bool geodetic() const;          // latitude and longitude
   bool has_sigmas() const;        // of positions
   bool has_angle_sigmas() const;  // of attitudes
-  void set(const std::string& field, std::size_t column) { place_[field] = column; }
+  // `header`: the name of the column, which may state a unit; empty: none.
+  void set(const std::string& field, std::size_t column, const std::string& header);
+  // Throws InputError if the names of x and y state another unit than the system has. Heights stay in the unit of the
+  // column where the system has them in this unit. `crs`: of the rows; `path`, `where`: of the file and its header.
+  void fit_to_system(const std::string& crs, const std::string& path, const std::string& where,
+                     std::vector<PositionTable::Row>& rows) const;
 
   // The row of a line; nothing if it has neither image nor time, or no coordinates, as programs write images without
   // position.
@@ -49,12 +56,19 @@ class PositionColumns {
   static std::string fields();  // all names, for messages
 
  private:
+  struct Column {
+    std::size_t at = 0;
+    ColumnUnit unit = {};
+    std::string header = {};
+  };
   struct Texts;
   static void set_time(const Texts& of, PositionTable::Row& row);
   static void set_sigmas(const Texts& of, PositionTable::Row& row);
   static void set_attitude(const Texts& of, std::optional<AngleKind> other, PositionTable::Row& row);
 
-  std::map<std::string, std::size_t> place_;  // field -> column
+  const char* height_field() const { return has("height") ? "height" : "z"; }
+
+  std::map<std::string, Column> place_;  // by field
 };
 
 }  // namespace megablock

@@ -70,6 +70,23 @@ Geodetic SystemOfTable::position(const PositionTable::Row& row) const {
   }
 }
 
+Eigen::Vector2d SystemOfTable::metres_per_unit(const Eigen::Vector3d& place) const {
+  constexpr double kStepDeg = 1e-4, kMetresPerDegree = 111132;  // to the north
+  if (local()) return {1, 1};
+  Eigen::Vector3d low = place;
+  if (std::isnan(low.z())) low.z() = 0;
+  try {
+    const Geodetic at = crs_->to_wgs84(low);
+    Geodetic north = at;
+    north.latitude_deg += kStepDeg;
+    const Eigen::Vector3d step = crs_->from_wgs84(north) - crs_->from_wgs84(at);
+    const double higher_m = crs_->to_wgs84(low + Eigen::Vector3d::UnitZ()).height_m;
+    return {kStepDeg * kMetresPerDegree / step.head<2>().norm(), higher_m - at.height_m};
+  } catch (const InputError&) {
+    return {kNoNumber, kNoNumber};
+  }
+}
+
 Eigen::Quaterniond SystemOfTable::rotation(const PositionTable::Row& row, const Geodetic& position) const {
   const Eigen::Quaterniond rotation = rotation_of(row);
   return refers_to_grid(row) ? (rotation * grid_from_true(*crs_, position)).normalized() : rotation;

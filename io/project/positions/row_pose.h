@@ -31,6 +31,8 @@ class SystemOfTable {
   bool local() const { return !crs_; }  // the block's own frame; the functions below are then not for it
   // The height is NaN where the row has none. Throws InputError with file:line for a place outside the system.
   Geodetic position(const PositionTable::Row& row) const;
+  // Metres of one unit of x and y, and of z, of the system at a place; NaN where it has no such place.
+  Eigen::Vector2d metres_per_unit(const Eigen::Vector3d& place) const;
   // R_own: from east, north, up at the position of the row.
   Eigen::Quaterniond rotation(const PositionTable::Row& row, const Geodetic& position) const;
 

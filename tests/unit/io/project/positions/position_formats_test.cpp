@@ -221,6 +221,38 @@ TEST_F(PositionFormats, TablesWithHeaders) {
               HasSubstr("t.csv:2: sigma must lie in [1e-08, 1e+06], not -1"));
 }
 
+TEST_F(PositionFormats, UnitsInTheNamesOfColumnsAreConverted) {
+  const auto row = [&](const std::string& columns, const std::string& values) {
+    return read("t.csv", "name,lat,lon," + columns + "\n1.jpg,46.8,-92," + values + "\n").rows.at(0);
+  };
+  for (const char* feet : {"altitude (ft)", "altitude [ft]", "altitude_ft", "Height (feet)", "altitude(feet)", "z_ft"})
+    EXPECT_DOUBLE_EQ(row(feet, "1000").place.z(), 304.8) << feet;
+  for (const char* feet : {"Height [us-ft]", "height (US survey feet)", "height_us_ft"})
+    EXPECT_DOUBLE_EQ(row(feet, "3937").place.z(), 1200) << feet;
+  EXPECT_DOUBLE_EQ(row("height_cm", "30480").place.z(), 304.8);
+  for (const char* metres : {"Height", "height_m", "Altitude (m)", "altitude [WGS84]", "Height (ellipsoidal) [m]"})
+    EXPECT_EQ(row(metres, "1000").place.z(), 1000) << metres;
+  EXPECT_EQ(row("altitude_ft,altitude_m", "1000,304").place.z(), 304) << "metres need no conversion";
+  EXPECT_DOUBLE_EQ(row("accuracy (cm)", "5").sigma_horizontal_m, 0.05);
+  EXPECT_DOUBLE_EQ(row("sigma_mm", "20").sigma_vertical_m, 0.02);
+  EXPECT_DOUBLE_EQ(row("sigma_heading (arcmin)", "30").sigma_heading_deg, 0.5);
+  const Eigen::Vector3d angles = row("omega (rad),phi_rad,kappa [mrad]", "0.1,-0.2,1500").angles_deg;
+  EXPECT_LT((angles - 57.29577951308232 * Eigen::Vector3d(0.1, -0.2, 1.5)).norm(), 1e-12);
+}
+
+TEST_F(PositionFormats, UnitsOfXAndYAreThoseOfTheirSystem) {
+  const std::string text = "name,Easting (ft),Northing (ft)\n1.jpg,1640416.75,17388333.5\n";
+  EXPECT_THAT(refusal("t.csv", text, {.crs = "EPSG:32632"}),
+              HasSubstr("t.csv:1: column 'Easting (ft)' is in ft, and the coordinate reference system 'EPSG:32632' is "
+                        "not; name a system in this unit with 'crs', or convert"));
+  EXPECT_THAT(refusal("t.csv", text, {.crs = "local"}), HasSubstr("column 'Easting (ft)' is in ft"));
+  const PositionTable table = read("t.csv", text, {.crs = "+proj=utm +zone=32 +datum=WGS84 +units=us-ft"});
+  EXPECT_EQ(table.rows.at(0).place.head<2>(), Eigen::Vector2d(1640416.75, 17388333.5));
+  const PositionOptions named = {.crs = "EPSG:32632", .columns = {{"image", "name"}, {"x", "Ost [ft]"}, {"y", "3"}}};
+  EXPECT_THAT(refusal("t.csv", "name,Ost [ft],Nord\n1.jpg,500000,5300000\n", named),
+              HasSubstr("column 'Ost [ft]' is in ft"));
+}
+
 TEST_F(PositionFormats, ColumnsThatTheProjectNames) {
   const PositionOptions names = {.crs = "EPSG:25832",
                                  .columns = {{"image", "Bild"}, {"x", "Rechtswert"}, {"y", "Hochwert"}, {"z", "4"}}};

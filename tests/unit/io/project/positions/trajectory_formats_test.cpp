@@ -145,6 +145,14 @@ TEST_F(TrajectoryFormats, TextOfInertialExplorer) {
       HasSubstr("drive.txt:3: 8 fields under 4 names of columns; export angles in decimal degrees"));
 }
 
+TEST_F(TrajectoryFormats, TextWithUnitsInTheLineUnderTheNames) {
+  const PositionTable table = read("drive.txt",
+                                   "GPSTime Latitude Longitude H-Ell SDHeight\n(sec) (deg) (deg) (ft) (ft)\n"
+                                   "126000 48.1 11.5 1000 0.1\n");
+  EXPECT_DOUBLE_EQ(table.rows.at(0).place.z(), 304.8);
+  EXPECT_DOUBLE_EQ(table.rows[0].sigma_vertical_m, 0.03048);
+}
+
 TEST_F(TrajectoryFormats, TextWithEastingAndNorthingNeedsASystem) {
   const std::string text =
       "POSPac export\nTIME EASTING NORTHING HEIGHT OMEGA PHI KAPPA\n126000.0 690000.5 5330000.25 545.1 0.5 -0.25 90\n";
