@@ -4,6 +4,9 @@
 //
 // Latitudes and longitudes are WGS84 unless `crs` says otherwise; x and y need `crs`, in the file ("# crs: EPSG:25832")
 // or in the project. Heights are metres, above the ellipsoid unless the system has a vertical part.
+#include <fmt/core.h>
+
+#include <algorithm>
 #include <charconv>
 
 #include "io/base/error.h"
@@ -26,6 +29,7 @@ struct ColumnHeader {
   Separator separator = Separator::kComma;
   std::size_t line = 0;  // among the lines of the text
   std::vector<std::string> names;
+  bool complete = true;  // every column that is used has a name
 };
 
 ColumnHeader column_header(const PositionText& text) {
@@ -64,16 +68,83 @@ std::string crs_of_columns(const PositionText& text) {
   return "";
 }
 
-PositionTable read_columns(const PositionText& text, const PositionOptions& options) {
+// Throws InputError for a row with more fields than names: its values would be read from the wrong columns.
+void check_field_count(const std::vector<std::string>& fields, const ColumnHeader& header, const std::string& where) {
+  std::size_t count = fields.size();
+  while (count > 0 && fields[count - 1].empty()) --count;
+  if (count <= header.names.size()) return;
+  throw InputError(fmt::format("{}: {} fields under {} names of columns; {}", where, fields.size(), header.names.size(),
+                               header.separator == Separator::kComma
+                                   ? "decimal commas need semicolons or tabs between the fields, texts with commas "
+                                     "need quotes"
+                                   : "name every column, and put texts that contain a separator in quotes"));
+}
+
+// Collects rows that end before their image or coordinates, for one note about all of them.
+class CutRows {
+ public:
+  void add(const std::vector<std::string>& fields, const ColumnHeader& header, const std::string& where) {
+    if (count_++ == 0)
+      first_ = fmt::format("{}: the line ends after {} of {} fields", where, fields.size(), header.names.size());
+  }
+  void report(std::vector<std::string>& notes) const {
+    if (count_ == 0) return;
+    const std::string all = count_ > 1 ? fmt::format(" ({} such lines in all)", count_) : "";
+    notes.push_back(first_ + ", before its image or coordinates, and is not used" + all + "; complete it");
+  }
+
+ private:
+  std::size_t count_ = 0;
+  std::string first_;
+};
+
+// The columns of the header, and those that the project names. Throws InputError if rows then have no place or owner.
+ColumnHeader needed_columns(const PositionText& text, const PositionOptions& options) {
   ColumnHeader header = column_header(text);
   for (const auto& [field, value] : options.columns) {
     const std::size_t column = column_of(header, field, value, text.path);
     header.columns.set(field, column, column < header.names.size() ? header.names[column] : "");
+    header.complete = header.complete && column < header.names.size();
   }
   if (!names_rows(header.columns))
     throw InputError(text.where(text.lines[header.line]) +
                      ": the header names no columns of image (or time) and position; name them in the project file: "
                      "'columns: {image: ..., x: ..., y: ..., z: ...}'");
+  return header;
+}
+
+// A table whose columns are numbered may have no header.
+bool is_row(const ColumnHeader& header, const PositionText& text, const PositionOptions& options) {
+  for (const char* field : {"x", "latitude"})
+    if (const auto found = options.columns.find(field); found != options.columns.end()) {
+      const std::size_t column = column_of(header, field, found->second, text.path);
+      if (column < header.names.size() && is_number(with_decimal_point(header.names[column], header.separator)))
+        return true;
+    }
+  return false;
+}
+
+void read_rows(const PositionText& text, const ColumnHeader& header, const PositionOptions& options,
+               PositionTable& table) {
+  const bool has_names = !is_row(header, text, options);
+  CutRows cut;
+  for (std::size_t l = header.line + (has_names ? 1 : 0); l < text.lines.size(); ++l) {
+    const TextLine& line = text.lines[l];
+    if (line.text.front() == '#') continue;
+    const std::string where = text.where(line);
+    const std::vector<std::string> fields = split_fields(line.text, header.separator);
+    if (has_names && header.complete) check_field_count(fields, header, where);
+    if (const auto row = header.columns.row(fields, header.separator, where, options.angles))
+      table.rows.push_back(*row);
+    else if (has_names && fields.size() < header.names.size())
+      cut.add(fields, header, where);
+  }
+  cut.report(table.notes);
+}
+
+PositionTable read_columns(const PositionText& text, const PositionOptions& options) {
+  const ColumnHeader header = needed_columns(text, options);
+  const std::string where = text.where(text.lines[header.line]);
   PositionTable table;
   if (!header.columns.has("image")) table.kind = PositionTable::Kind::kPath;
   table.states_sigmas = header.columns.has_sigmas();
@@ -82,26 +153,11 @@ PositionTable read_columns(const PositionText& text, const PositionOptions& opti
   if (table.crs.empty() && header.columns.geodetic()) table.crs = "WGS84";
   if (table.crs.empty() && options.crs.empty())
     throw InputError(
-        text.where(text.lines[header.line]) +
+        where +
         ": the columns x and y need a coordinate reference system; add 'crs: EPSG:...' beside 'file' in the "
         "project file");
-  // A table whose columns are numbered may have no header.
-  const std::vector<std::string>& names = header.names;
-  bool has_header = true;
-  for (const char* field : {"x", "latitude"})
-    if (const auto found = options.columns.find(field); found != options.columns.end()) {
-      const std::size_t column = column_of(header, field, found->second, text.path);
-      if (column < names.size() && is_number(with_decimal_point(names[column], header.separator))) has_header = false;
-    }
-  for (std::size_t l = header.line + (has_header ? 1 : 0); l < text.lines.size(); ++l) {
-    const TextLine& line = text.lines[l];
-    if (line.text.front() == '#') continue;
-    const auto row = header.columns.row(split_fields(line.text, header.separator), header.separator, text.where(line),
-                                        options.angles);
-    if (row) table.rows.push_back(*row);
-  }
-  header.columns.fit_to_system(options.crs.empty() ? table.crs : options.crs, text.path,
-                               text.where(text.lines[header.line]), table.rows);
+  read_rows(text, header, options, table);
+  header.columns.fit_to_system(options.crs.empty() ? table.crs : options.crs, text.path, where, table.rows);
   return table;
 }
 

@@ -253,6 +253,32 @@ TEST_F(PositionFormats, UnitsOfXAndYAreThoseOfTheirSystem) {
               HasSubstr("column 'Ost [ft]' is in ft"));
 }
 
+TEST_F(PositionFormats, RowsWithMoreFieldsThanNamesAreRefused) {
+  const PositionOptions local = {.crs = "local"};
+  const std::string head = "image,x,y,z\n";
+  EXPECT_THAT(
+      refusal("t.csv", head + "f.jpg,953,53,1974,31,599,42\n", local),
+      HasSubstr("t.csv:2: 7 fields under 4 names of columns; decimal commas need semicolons or tabs between the "
+                "fields"));
+  EXPECT_THAT(read("t.csv", head + "f.jpg,953.53,1974.31,599.42,,\n", local).rows, SizeIs(1))
+      << "empty ones at the end";
+  EXPECT_THAT(refusal("t.csv", "image;x;y;z\nf.jpg;953,53;1974,31;599,42;sharp\n", local),
+              HasSubstr("t.csv:2: 5 fields under 4 names of columns; name every column"));
+  const PositionOptions numbers = {.crs = "local", .columns = {{"image", "1"}, {"x", "2"}, {"y", "3"}, {"z", "5"}}};
+  EXPECT_THAT(read("t.csv", "image,x,y\nf.jpg,953.53,1974.31,good,599.42\n", numbers).rows, SizeIs(1))
+      << "the project names a column that the header does not";
+}
+
+TEST_F(PositionFormats, RowsThatAreCutAreNamed) {
+  const std::string head = "image,x,y,z\n", good = "f.jpg,953.53,1974.31,599.42\n";
+  const PositionTable table = read("t.csv", head + good + "g.jpg,953.5\nh.jpg\n", {.crs = "local"});
+  EXPECT_THAT(table.rows, SizeIs(1));
+  EXPECT_THAT(table.notes, ElementsAre(HasSubstr("t.csv:3: the line ends after 2 of 4 fields, before its image or "
+                                                 "coordinates, and is not used (2 such lines in all)")));
+  EXPECT_THAT(read("t.csv", head + good + "g.jpg,,,\n", {.crs = "local"}).notes, IsEmpty())
+      << "programs write images without position so";
+}
+
 TEST_F(PositionFormats, ColumnsThatTheProjectNames) {
   const PositionOptions names = {.crs = "EPSG:25832",
                                  .columns = {{"image", "Bild"}, {"x", "Rechtswert"}, {"y", "Hochwert"}, {"z", "4"}}};
