@@ -21,6 +21,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "geometry/numbers/angles.h"
 #include "geometry/transform/rotation.h"
@@ -206,6 +207,30 @@ std::vector<Eigen::Vector2d> set_position_priors(const std::vector<ScannedImage>
   return sigmas;
 }
 
+// Warns of positions without a height, unless a trajectory takes their place. Heights that are far off, which
+// `positions` leaves out as well, were warned of before.
+void warn_of_missing_heights(const std::vector<ScannedImage>& scanned,
+                             const std::vector<std::optional<Geodetic>>& positions, const Trajectories& trajectories,
+                             Project& project) {
+  std::set<FrameIndex> replaced;
+  for (const auto& pose : trajectories.poses) replaced.insert(pose.frame);
+  std::size_t missing = 0, known = 0;
+  const ScannedImage* first = nullptr;
+  for (std::size_t i = 0; i < scanned.size(); ++i) {
+    const ImageIndex image(static_cast<std::int64_t>(i));
+    if (!positions[i] || replaced.contains(project.block.images[image].frame)) continue;
+    ++known;
+    if (std::isfinite(scanned[i].header.position->height_m)) continue;
+    if (missing++ == 0) first = &scanned[i];
+  }
+  if (missing == 0) return;
+  project.warnings.push_back(fmt::format(
+      "{} of {} images with a position have no height there (the first is '{}', from {}): each gets that of "
+      "the origin with a sigma of {:g} m; give heights in a file ('positions'), or control points, which "
+      "determine the height of the block",
+      missing, known, first->name, first->header.position_source, kUnknownHeightSigma));
+}
+
 // Whether several images have one and the same position: a receiver without updates, or a tripod. It is then one
 // observation of the whole block, which places the block and tells nothing of its scale and direction.
 bool share_one_position(const std::vector<Geodetic>& known) {
@@ -317,6 +342,7 @@ Eigen::Vector3d read_positions(YamlReader& top, const std::vector<ScannedImage>&
     positions.assign(scanned.size(), std::nullopt);
     project.warnings.push_back(text_of_one_position(known, scanned.size()));
   }
+  if (block.ground.georeferenced) warn_of_missing_heights(scanned, positions, trajectories, project);
   const auto sigmas = set_position_priors(scanned, positions, options, block);
   const std::vector<std::string> lines = lines_of_positions(scanned, sigmas);
   project.found.insert(project.found.end(), lines.begin(), lines.end());

@@ -142,6 +142,22 @@ void read_rows(const PositionText& text, const ColumnHeader& header, const Posit
   cut.report(table.notes);
 }
 
+// Heights above the take-off are no heights of a system.
+void note_relative_heights(const ColumnHeader& header, const std::string& where, PositionTable& table) {
+  if (header.columns.has("height") || header.columns.has("z")) return;
+  for (const std::string& name : header.names) {
+    std::string letters = column_name(name).name;
+    std::erase(letters, '_');
+    const auto contains = [&](const char* part) { return letters.find(part) != std::string::npos; };
+    if (!contains("relativealt") && !contains("relativeheight") && !contains("relalt") && !contains("abovetakeoff"))
+      continue;
+    table.notes.push_back(where + ": column '" + name +
+                          "' counts from the take-off and is no height; give heights above the ellipsoid, or above the "
+                          "geoid with a vertical part of 'crs', in a column 'height'");
+    return;
+  }
+}
+
 PositionTable read_columns(const PositionText& text, const PositionOptions& options) {
   const ColumnHeader header = needed_columns(text, options);
   const std::string where = text.where(text.lines[header.line]);
@@ -156,6 +172,7 @@ PositionTable read_columns(const PositionText& text, const PositionOptions& opti
         where +
         ": the columns x and y need a coordinate reference system; add 'crs: EPSG:...' beside 'file' in the "
         "project file");
+  note_relative_heights(header, where, table);
   read_rows(text, header, options, table);
   header.columns.fit_to_system(options.crs.empty() ? table.crs : options.crs, text.path, where, table.rows);
   return table;

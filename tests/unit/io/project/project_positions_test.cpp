@@ -72,9 +72,11 @@ TEST_F(ProjectPositions, TakeThePlaceOfThoseInTheHeaders) {
   EXPECT_EQ(prior(project, 1).sigma, Eigen::Vector3d(3, 3, 6));
   EXPECT_EQ(prior(project, 2).sigma, Eigen::Vector3d(3, 3, 1000)) << "no height";
   EXPECT_FALSE(project.block.frames[FrameIndex(3)].position_prior) << "positions of headers may have another datum";
-  EXPECT_THAT(project.warnings,
-              ElementsAre(HasSubstr("geo.txt:5: 1 of 4 lines are not used, because the block has no such image"),
-                          HasSubstr("block.yaml:2: 1 of 4 images have no position in the files of 'positions'")));
+  EXPECT_THAT(
+      project.warnings,
+      ElementsAre(HasSubstr("geo.txt:5: 1 of 4 lines are not used, because the block has no such image"),
+                  HasSubstr("block.yaml:2: 1 of 4 images have no position in the files of 'positions'"),
+                  HasSubstr("1 of 3 images with a position have no height there (the first is '100_0001_0003.JPG'")));
   EXPECT_THAT(project.found,
               ElementsAre("positions: 3 of 4 images from geo.txt, sigma 0.02 to 3 m, vertical 0.05 to 1e+03 m",
                           "attitudes: none"));
@@ -241,6 +243,26 @@ TEST_F(ProjectPositions, FarFromTheHeadersAreToldOf) {
   for (int i = 1; i <= 4; ++i) geo += "100_0001_000" + std::to_string(i) + ".JPG -91.99 46.85 250\n";
   EXPECT_THAT(read("geo.txt", geo).warnings,
               Contains(HasSubstr("geo.txt: its positions lie 1114 m (median) from those of the image headers")));
+}
+
+TEST_F(ProjectPositions, WithoutHeightsAreToldOf) {
+  const auto told = [](const std::string& source) {
+    return ElementsAre(
+        HasSubstr("2 of 4 images with a position have no height there (the first is "
+                  "'100_0001_0002.JPG', from " +
+                  source + "): each gets that of the origin with a sigma of 1000 m; give heights"));
+  };
+  const std::string file =
+      "name,lat,lon,height\n100_0001_0001,46.84,-91.99,250\n100_0001_0002,46.84,-91.9898\n"
+      "100_0001_0003,46.84,-91.9896,nan\n100_0001_0004,46.84,-91.9894,250\n";
+  EXPECT_THAT(read("heights.csv", file).warnings, told("heights.csv"));
+  for (int i = 1; i < 3; ++i) {
+    Tags flat = gps_tags(46.84, -91.99 + 0.0002 * i, 250);
+    flat.erase("Exif.GPSInfo.GPSAltitude");
+    write(i, flat);
+  }
+  write_file(folder_.path("block.yaml"), "images: images\n");
+  EXPECT_THAT(read_project(folder_.path("block.yaml")).warnings, told("EXIF"));
 }
 
 TEST_F(ProjectPositions, RefusalsNameFileAndLine) {

@@ -279,6 +279,17 @@ TEST_F(PositionFormats, RowsThatAreCutAreNamed) {
       << "programs write images without position so";
 }
 
+TEST_F(PositionFormats, HeightsAboveTheTakeOffAreNone) {
+  for (const std::string name : {"relative_altitude", "RelativeAltitude", "height_above_takeoff(feet)"}) {
+    const PositionTable table = read("t.csv", "name,lat,lon," + name + "\n1.jpg,46.8,-92,80\n");
+    EXPECT_TRUE(std::isnan(table.rows.at(0).place.z()));
+    EXPECT_THAT(table.notes, ElementsAre(HasSubstr("t.csv:1: column '" + name +
+                                                   "' counts from the take-off and is no "
+                                                   "height; give heights above the ellipsoid")));
+  }
+  EXPECT_THAT(read("t.csv", "name,lat,lon,alt,RelativeAltitude\n1.jpg,46.8,-92,280,80\n").notes, IsEmpty());
+}
+
 TEST_F(PositionFormats, ColumnsThatTheProjectNames) {
   const PositionOptions names = {.crs = "EPSG:25832",
                                  .columns = {{"image", "Bild"}, {"x", "Rechtswert"}, {"y", "Hochwert"}, {"z", "4"}}};
