@@ -24,6 +24,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kFarFromHeader = 50;  // m; single GNSS positions and rounded coordinates are nearer
+constexpr double kFarHeight = 150;     // m; heights above the ellipsoid and above the geoid differ by less
 
 struct PositionSource : TableSource {
   std::string exposures;
@@ -212,6 +213,35 @@ double flat_distance_m(const Geodetic& a, const Geodetic& b) {
   return std::hypot(east, a.latitude_deg - b.latitude_deg) * kMetresPerDegree;
 }
 
+// Compares the positions of a file with those of the headers.
+class FromHeaders {
+ public:
+  void add(const Geodetic& header, const Geodetic& file) {
+    distances_.push_back(flat_distance_m(header, file));
+    const double higher = file.height_m - header.height_m;
+    if (std::isfinite(higher)) heights_.push_back(higher);
+  }
+  void report(const std::string& path, std::vector<std::string>& warnings) const {
+    constexpr std::size_t kFewest = 3;
+    if (distances_.size() >= kFewest && median(distances_) > kFarFromHeader)
+      warnings.push_back(
+          fmt::format("{}: its positions lie {:.0f} m (median) from those of the image headers; check that it belongs "
+                      "to these images and is in the coordinate system that it names",
+                      path, median(distances_)));
+    if (heights_.size() < kFewest) return;
+    const double higher = median(heights_);
+    if (std::abs(higher) > kFarHeight)
+      warnings.push_back(
+          fmt::format("{}: its heights are {:.0f} m (median) {} those of the image headers; check whether they are in "
+                      "feet ('altitude (ft)' as the name of the column converts them) or count from another level (the "
+                      "take-off)",
+                      path, std::abs(higher), higher > 0 ? "above" : "below"));
+  }
+
+ private:
+  std::vector<double> distances_, heights_;
+};
+
 }  // namespace
 
 bool read_position_files(YamlReader& top, std::vector<ScannedImage>& scanned, Project& project) {
@@ -232,7 +262,7 @@ bool read_position_files(YamlReader& top, std::vector<ScannedImage>& scanned, Pr
     RowsOfImages finder(source, scanned, project);
     const auto rows = finder.find(lookup);
     const IntoHeaders write(source, finder.crs());
-    std::vector<double> distances;
+    FromHeaders from_headers;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       if (!rows[i]) continue;
       if (source_of[i] != nullptr)
@@ -241,15 +271,9 @@ bool read_position_files(YamlReader& top, std::vector<ScannedImage>& scanned, Pr
                          "'; leave out one of the files, or give 'images: FOLDER' for each");
       source_of[i] = &source;
       write(*rows[i], scanned[i]);
-      if (before[i] && scanned[i].header.position)
-        distances.push_back(flat_distance_m(*before[i], *scanned[i].header.position));
+      if (before[i] && scanned[i].header.position) from_headers.add(*before[i], *scanned[i].header.position);
     }
-    if (distances.size() > 2 && median(distances) > kFarFromHeader)
-      project.warnings.push_back(
-          fmt::format("{}: its positions lie {:.0f} m (median) from those of the image headers; check that it belongs "
-                      "to these images "
-                      "and is in the coordinate system that it names",
-                      source.path, median(distances)));
+    from_headers.report(source.path, project.warnings);
   }
   const std::int64_t without = std::ranges::count_if(
       scanned, [](const ScannedImage& image) { return !image.header.position && !image.local_position; });

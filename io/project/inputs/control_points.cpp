@@ -8,6 +8,7 @@
 #include "io/base/error.h"
 #include "io/block/held_priors.h"
 #include "io/project/inputs/control_file.h"
+#include "io/project/inputs/geographic_fault.h"
 #include "io/project/inputs/image_lookup.h"
 
 namespace megablock {
@@ -66,6 +67,12 @@ CrsToWgs84 crs_of(const ControlTable& table) {
   }
 }
 
+InputError refusal(const ControlTable::Point& point, const CrsToWgs84& crs, const Eigen::Vector3d& xyz,
+                   const InputError& error) {
+  const std::string fault = geographic_fault(crs, xyz);
+  return InputError(point.where + ": point '" + point.name + "': " + (fault.empty() ? error.what() : fault));
+}
+
 // Transforms coordinates from the system of the file into the ground frame of the block.
 class ToGround {
  public:
@@ -86,7 +93,7 @@ class ToGround {
     try {
       return reference_->to_local(crs_->to_wgs84(xyz));
     } catch (const InputError& error) {
-      throw InputError(point.where + ": point '" + point.name + "': " + error.what());
+      throw refusal(point, *crs_, xyz, error);
     }
   }
 
@@ -109,7 +116,7 @@ std::vector<Geodetic> geodetic_positions(const ControlTable& table) {
     try {
       positions.push_back(crs.to_wgs84(xyz));
     } catch (const InputError& error) {
-      throw InputError(point.where + ": point '" + point.name + "': " + error.what());
+      throw refusal(point, crs, xyz, error);
     }
     if (flat) positions.back().height_m = point.coordinates.z();
   }

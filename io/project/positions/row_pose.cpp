@@ -6,6 +6,7 @@
 #include "geometry/transform/body_attitude.h"
 #include "geometry/transform/rotation.h"
 #include "io/base/error.h"
+#include "io/project/inputs/geographic_fault.h"
 
 namespace megablock {
 
@@ -66,7 +67,8 @@ Geodetic SystemOfTable::position(const PositionTable::Row& row) const {
     if (flat) result.height_m = kNoNumber;
     return result;
   } catch (const InputError& error) {
-    throw InputError(row.where + ": " + error.what());
+    const std::string fault = geographic_fault(*crs_, place);
+    throw InputError(row.where + ": " + (fault.empty() ? error.what() : fault));
   }
 }
 

@@ -245,6 +245,22 @@ TEST_F(ProjectPositions, FarFromTheHeadersAreToldOf) {
               Contains(HasSubstr("geo.txt: its positions lie 1114 m (median) from those of the image headers")));
 }
 
+// 250 m are 820 feet.
+TEST_F(ProjectPositions, WithHeightsFarFromTheHeadersAreToldOf) {
+  const auto geo = [](const std::string& height) {
+    std::string text = "EPSG:4326\n";
+    for (int i = 0; i < 4; ++i)
+      text += "100_0001_000" + std::to_string(i + 1) + " " + std::to_string(-91.99 + 0.0002 * i) + " 46.84 " + height +
+              "\n";
+    return text;
+  };
+  EXPECT_THAT(read("geo.txt", geo("820.2")).warnings,
+              ElementsAre(HasSubstr("geo.txt: its heights are 570 m (median) above those of the image headers; check "
+                                    "whether they are in feet")));
+  EXPECT_THAT(read("geo.txt", geo("80")).warnings, ElementsAre(HasSubstr("its heights are 170 m (median) below")));
+  EXPECT_THAT(read("geo.txt", geo("203")).warnings, IsEmpty()) << "above the geoid";
+}
+
 TEST_F(ProjectPositions, WithoutHeightsAreToldOf) {
   const auto told = [](const std::string& source) {
     return ElementsAre(
@@ -274,7 +290,14 @@ TEST_F(ProjectPositions, RefusalsNameFileAndLine) {
               HasSubstr("geo.txt:2: the block has none of the images of this file (the first is 'X.JPG')"));
   EXPECT_THAT(refusal("geo.txt", "EPSG:999999\n100_0001_0001.JPG -91.99 46.84 250\n"),
               HasSubstr("geo.txt: coordinate reference system 'EPSG:999999' is not known to PROJ"));
-  EXPECT_THAT(refusal("geo.txt", "EPSG:4326\n100_0001_0001.JPG -91.99 146.84 250\n"), HasSubstr("geo.txt:2: "));
+  EXPECT_EQ(refusal("geo.txt", "EPSG:4326\n100_0001_0001.JPG 46.84 -91.99 250\n"),
+            "geo.txt:2: latitude -91.99 is out of range [-90, 90]; are latitude and longitude exchanged?");
+  EXPECT_EQ(refusal("geo.txt", "EPSG:4258\n100_0001_0001.JPG 46.84 -91.99 250\n"),
+            "geo.txt:2: latitude -91.99 is out of range [-90, 90]; are latitude and longitude exchanged?");
+  EXPECT_EQ(refusal("geo.txt", "EPSG:4326\n100_0001_0001.JPG -91.99 146.84 250\n"),
+            "geo.txt:2: latitude 146.84 is out of range [-90, 90]; correct it");
+  EXPECT_THAT(refusal("geo.txt", "EPSG:4326\n100_0001_0001.JPG 576700 5188000 250\n"),
+              HasSubstr("geo.txt:2: longitude 576700 is out of range [-180, 180]; correct it, or name the coordinate"));
   EXPECT_THAT(refusal("geo.txt", good, "positions: none.txt\n"),
               HasSubstr("block.yaml:2: positions: file 'none.txt' does not exist"));
   EXPECT_THAT(refusal("geo.txt", good, "positions: {format: odm_geo}\n"),

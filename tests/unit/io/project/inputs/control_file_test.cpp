@@ -100,7 +100,9 @@ TEST_F(ControlFile, GcpListRefusals) {
               HasSubstr("gcp_list.txt:3: point 'a' has other coordinates than in gcp_list.txt:2"));
   EXPECT_THAT(refusal("gcp_list.txt", "# a comment\nEPSG:123456\n" + good),
               HasSubstr("gcp_list.txt:2: coordinate reference system 'EPSG:123456' is not known to PROJ"));
-  EXPECT_THAT(refusal("gcp_list.txt", "WGS84\n52.52 113.4 40 5 6 sub/0.jpg a\n"), HasSubstr("gcp_list.txt:2"));
+  EXPECT_EQ(
+      refusal("gcp_list.txt", "WGS84\n52.52 113.4 40 5 6 sub/0.jpg a\n"),
+      "gcp_list.txt:2: point 'a': latitude 113.4 is out of range [-90, 90]; are latitude and longitude exchanged?");
   EXPECT_THAT(refusal("gcp_list.txt", "EPSG:25832\n1e300 5 40 5 6 sub/0.jpg a\n"),
               HasSubstr("gcp_list.txt:2: x: 1e+300 is beyond any place on Earth"));
   EXPECT_THAT(refusal("gcp_list.txt", ""), HasSubstr("gcp_list.txt: the file is empty"));
