@@ -28,6 +28,7 @@ constexpr double kFarHeight = 150;     // m; heights above the ellipsoid and abo
 
 struct PositionSource : TableSource {
   std::string exposures;
+  bool sigmas_of_project = false;  // the project file states both sigmas, in place of those of the file
 };
 
 AngleKind angle_kind(const std::string& text, const std::string& where) {
@@ -83,6 +84,7 @@ class RowsOfImages {
       for (PositionTable::Row& row : table.rows) row.offset_m.setZero();
     }
     crs_ = table.crs;
+    note_zero_sigmas(table);
     rows_.resize(scanned_.size());
     if (table.kind == PositionTable::Kind::kImages)
       by_name(table, lookup);
@@ -99,6 +101,17 @@ class RowsOfImages {
   const std::string& crs() const { return crs_; }
 
  private:
+  // In the project file 0 holds a position; programs write it where they know nothing.
+  void note_zero_sigmas(PositionTable& table) const {
+    const auto zeros = std::ranges::count_if(table.rows, &PositionTable::Row::zero_sigma);
+    if (zeros == 0 || source_.sigmas_of_project) return;
+    table.notes.push_back(fmt::format(
+        "{}: {} of {} lines state a sigma of 0, which counts as not stated (default 3 m, vertical 6 m); write the "
+        "sigmas that are true, or hold the positions with 'gps: {{sigma_horizontal_m: 0, "
+        "sigma_vertical_m: 0}}'",
+        std::ranges::find_if(table.rows, &PositionTable::Row::zero_sigma)->where, zeros, table.rows.size()));
+  }
+
   void by_name(const PositionTable& table, const ImageLookup& lookup) {
     std::size_t absent = 0, used = 0;
     const PositionTable::Row* first_absent = nullptr;
@@ -245,8 +258,15 @@ class FromHeaders {
 }  // namespace
 
 bool read_position_files(YamlReader& top, std::vector<ScannedImage>& scanned, Project& project) {
-  const auto sources = read_table_sources<PositionSource>(top, "positions", read_source);
+  auto sources = read_table_sources<PositionSource>(top, "positions", read_source);
   if (sources.empty()) return false;
+  auto gps = top.mapping("gps");
+  const auto states = [&](const std::optional<double>& own, const char* key) {
+    return own.has_value() || (gps && gps->node(key));
+  };
+  for (PositionSource& source : sources)
+    source.sigmas_of_project =
+        states(source.sigma_horizontal, "sigma_horizontal_m") && states(source.sigma_vertical, "sigma_vertical_m");
   if (scanned.empty()) refuse_unused(top, "positions", "with 'block', which has its own positions");
   std::vector<std::string> left_out = project.copies;
   for (const auto& [name, reason] : project.unreadable) left_out.push_back(name);

@@ -221,6 +221,8 @@ void PositionColumns::set_sigmas(const Texts& of, PositionTable::Row& row) {
   if (std::isnan(row.sigma_horizontal_m)) row.sigma_horizontal_m = all;
   row.sigma_vertical_m = of.sigma_m("sigma_vertical");
   if (std::isnan(row.sigma_vertical_m)) row.sigma_vertical_m = all;
+  for (const char* field : {"sigma", "sigma_x", "sigma_y", "sigma_horizontal", "sigma_vertical"})
+    row.zero_sigma = row.zero_sigma || is_zero(of.text(field), of.separator);
   const double rotation = of.sigma_deg("sigma_rotation");
   row.sigma_tilt_deg = std::fmax(of.sigma_deg("sigma_roll"), of.sigma_deg("sigma_pitch"));
   if (std::isnan(row.sigma_tilt_deg)) row.sigma_tilt_deg = rotation;

@@ -47,7 +47,12 @@ double position_sigma(const std::string& text, Separator separator, const Limits
   if (text.empty() || lower_case(text) == "nan") return kNoNumber;
   const double sigma = position_number(text, separator, what, where);
   if (sigma == 0) return kNoNumber;
-  check_within(sigma, limits, what, where);
+  try {
+    check_within(sigma, limits, what, where);
+  } catch (const InputError& error) {
+    throw InputError(std::string(error.what()) +
+                     "; write a standard deviation, or leave the field empty if it is not known");
+  }
   return sigma;
 }
 
@@ -63,10 +68,16 @@ double position_sigma_deg(const std::string& text, Separator separator, const st
   return position_sigma(text, separator, kSigmaDegrees, what, where);
 }
 
+bool is_zero(const std::string& text, Separator separator) {
+  const std::string number = with_decimal_point(text, separator);
+  return is_number(number) && parse_number(number, "", "") == 0;
+}
+
 void read_sigmas(const std::vector<std::string>& fields, std::size_t first, Separator separator,
                  const std::string& where, PositionTable::Row& row) {
   row.sigma_horizontal_m = position_sigma_m(fields[first], separator, "horizontal accuracy", where);
   row.sigma_vertical_m = position_sigma_m(fields[first + 1], separator, "vertical accuracy", where);
+  row.zero_sigma = is_zero(fields[first], separator) || is_zero(fields[first + 1], separator);
 }
 
 double calendar_seconds(int year, int month, int day, double seconds_of_day) {

@@ -24,6 +24,9 @@ double position_sigma_m(const std::string& text, Separator separator, const std:
 double position_sigma_deg(const std::string& text, Separator separator, const std::string& what,
                           const std::string& where);
 
+// Whether a field is a sigma of 0.
+bool is_zero(const std::string& text, Separator separator);
+
 // Reads a horizontal and a vertical sigma from two fields that follow each other, by position_sigma_m().
 void read_sigmas(const std::vector<std::string>& fields, std::size_t first, Separator separator,
                  const std::string& where, PositionTable::Row& row);

@@ -31,6 +31,7 @@ struct PositionTable {
     // the camera, as the file has it.
     Eigen::Vector3d place = Eigen::Vector3d::Constant(kNoNumber);
     double sigma_horizontal_m = kNoNumber, sigma_vertical_m = kNoNumber;
+    bool zero_sigma = false;  // the file states a sigma of 0 for the position, which counts as not stated
     // Camera minus antenna at this exposure: east, north, up, metres. It is not yet in `place`.
     Eigen::Vector3d offset_m = Eigen::Vector3d::Zero();
     Eigen::Vector3d angles_deg = Eigen::Vector3d::Constant(kNoNumber);  // in the order of their kind; NaN: none

@@ -91,6 +91,21 @@ TEST_F(ProjectPositions, HaveSigmasFromTheSectionAndFromGps) {
       << "gps.use is about the headers";
 }
 
+TEST_F(ProjectPositions, WithASigmaOfZeroAreToldOf) {
+  const std::string file =
+      "name,lat,lon,height,accuracy\n100_0001_0001,46.84,-91.99,250,0.02\n100_0001_0002,46.84,-91.9898,250,0\n"
+      "100_0001_0003,46.84,-91.9896,250,0.0\n100_0001_0004,46.84,-91.9894,250,\n";
+  const Project project = read("zero.csv", file);
+  EXPECT_EQ(prior(project, 1).sigma, Eigen::Vector3d(3, 3, 6));
+  EXPECT_THAT(project.warnings,
+              ElementsAre(HasSubstr("zero.csv:3: 2 of 4 lines state a sigma of 0, which counts as not stated (default "
+                                    "3 m, vertical 6 m); write the sigmas that are true, or hold the positions with "
+                                    "'gps: {sigma_horizontal_m: 0, sigma_vertical_m: 0}'")));
+  EXPECT_THAT(read("zero.csv", file, "gps: {sigma_horizontal_m: 0, sigma_vertical_m: 0}\n").warnings, IsEmpty());
+  EXPECT_THAT(read("geo.txt", "EPSG:4326\n100_0001_0001 -91.99 46.84 250 0 0 0 0 0.05\n").warnings,
+              Contains(HasSubstr("geo.txt:2: 1 of 1 lines state a sigma of 0")));
+}
+
 TEST_F(ProjectPositions, InAnySystemWithHeightsAboveTheGeoid) {
   std::optional<CrsToWgs84> crs;
   try {

@@ -218,7 +218,8 @@ TEST_F(PositionFormats, TablesWithHeaders) {
   EXPECT_THAT(refusal("t.csv", "name,x,y\n1.jpg,1,2\n"), HasSubstr("t.csv:1: the columns x and y need a coordinate"));
   EXPECT_THAT(refusal("t.csv", "name,lat,lon\n1.jpg,46.8,x\n"), HasSubstr("t.csv:2: longitude: 'x' is no angle"));
   EXPECT_THAT(refusal("t.csv", "name,lat,lon,accuracy\n1.jpg,46.8,9,-1\n"),
-              HasSubstr("t.csv:2: sigma must lie in [1e-08, 1e+06], not -1"));
+              HasSubstr("t.csv:2: sigma must lie in [1e-08, 1e+06], not -1; write a standard deviation, or leave the "
+                        "field empty if it is not known"));
 }
 
 TEST_F(PositionFormats, UnitsInTheNamesOfColumnsAreConverted) {
