@@ -46,6 +46,17 @@ bool has_format(const fs::path& path, const PositionFormat& format) {
   }
 }
 
+// What a file named geo.txt is: others than OpenDroneMap use the name for tables with a header.
+std::string describe_positions(const fs::path& path) {
+  try {
+    const PositionText text{path.string(), read_text_lines(path.string())};
+    if (const PositionFormat* format = recognise_positions(text)) return format->describe;
+  } catch (const Error&) {
+    // The reader will say what is wrong with the file.
+  }
+  return kOdmGeo.describe;
+}
+
 std::vector<FoundInput> find_logs(const std::vector<fs::path>& files) {
   struct Logs {
     std::vector<std::string> exposures, solutions;
@@ -90,7 +101,7 @@ std::vector<FoundInput> find_inputs(const std::string& images) {
     break;
   }
   if (const auto geo = named("geo.txt"); geo != files.end()) {
-    inputs.push_back({"positions", {geo->string()}, kOdmGeo.describe});
+    inputs.push_back({"positions", {geo->string()}, describe_positions(*geo)});
     return inputs;
   }
   const std::vector<FoundInput> logs = find_logs(files);

@@ -12,6 +12,16 @@
 
 namespace megablock {
 
+namespace {
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ",") + name;
+  return list;
+}
+
+}  // namespace
+
 CsvTable::CsvTable(const std::string& path) : path_(path) {
   std::istringstream stream(read_text(path));
   std::int64_t lines = 0, number = 1;  // of the row's first line
@@ -45,10 +55,15 @@ CsvTable::CsvTable(const std::string& path) : path_(path) {
   if (columns_.empty()) throw InputError(path + ": is empty; expected a header line with the names of the columns");
 }
 
-void CsvTable::require(const std::vector<std::string>& columns) const {
-  for (const std::string& column : columns)
-    if (!has(column))
-      throw InputError(path_ + ":" + std::to_string(header_line_) + ": column '" + column + "' is missing");
+void CsvTable::require(const std::vector<std::string>& columns, const std::string& remedy) const {
+  for (const std::string& column : columns) {
+    if (has(column)) continue;
+    std::vector<std::string> found(columns_.size());
+    for (const auto& [name, position] : columns_) found[position] = name;
+    throw InputError(path_ + ":" + std::to_string(header_line_) + ": column '" + column + "' is missing" +
+                     (remedy.empty() ? "" : "; " + remedy) + "; the header needs " + joined(columns) + ", and has " +
+                     joined(found));
+  }
 }
 
 void CsvTable::refuse_others(const std::vector<std::string>& columns) const {

@@ -20,7 +20,9 @@ class CsvTable {
 
   std::size_t row_count() const { return rows_.size(); }
   bool has(const std::string& column) const { return columns_.contains(column); }
-  void require(const std::vector<std::string>& columns) const;  // throws InputError with the name of a missing column
+  // Throws InputError with the name of a missing column, `remedy`, and the names that are needed and those that are
+  // there.
+  void require(const std::vector<std::string>& columns, const std::string& remedy = "") const;
   // Throws InputError for a column that is not in the list.
   void refuse_others(const std::vector<std::string>& columns) const;
   std::string text(std::size_t row, const std::string& column) const;              // "" if empty or absent

@@ -251,7 +251,9 @@ void check_repeated(const CsvTable& csv, std::size_t row, const ControlTable::Po
 
 ControlTable read_csv(const std::string& path) {
   const CsvTable csv(path);
-  csv.require({"name", "x", "y", "z", "image", "column_px", "row_px"});
+  const bool marks = csv.has("image") && csv.has("column_px") && csv.has("row_px");
+  csv.require({"name", "x", "y", "z", "image", "column_px", "row_px"},
+              marks ? "" : "each point needs its marks in images, one line for each: image, column_px, row_px");
   csv.refuse_others({"name", "x", "y", "z", "image", "column_px", "row_px", "role", "sigma_horizontal_m",
                      "sigma_vertical_m", "sigma_px"});
   ControlTable table;

@@ -98,6 +98,17 @@ class CutRows {
   std::string first_;
 };
 
+std::string quoted_names(const std::vector<std::string>& names) {
+  constexpr std::size_t kNamed = 20;
+  std::string list;
+  for (std::size_t n = 0; n < std::min(names.size(), kNamed); ++n) list += (n ? ", '" : "'") + names[n] + "'";
+  return names.size() > kNamed ? list + ", ..." : list;
+}
+
+std::string said_names(const ColumnHeader& header) {
+  return header.names.empty() ? "" : "; its names are " + quoted_names(header.names);
+}
+
 // The columns of the header, and those that the project names. Throws InputError if rows then have no place or owner.
 ColumnHeader needed_columns(const PositionText& text, const PositionOptions& options) {
   ColumnHeader header = column_header(text);
@@ -108,8 +119,8 @@ ColumnHeader needed_columns(const PositionText& text, const PositionOptions& opt
   }
   if (!names_rows(header.columns))
     throw InputError(text.where(text.lines[header.line]) +
-                     ": the header names no columns of image (or time) and position; name them in the project file: "
-                     "'columns: {image: ..., x: ..., y: ..., z: ...}'");
+                     ": the header names no columns of image (or time) and position" + said_names(header) +
+                     "; name them in the project file: 'columns: {image: ..., x: ..., y: ..., z: ...}'");
   return header;
 }
 
@@ -179,6 +190,14 @@ PositionTable read_columns(const PositionText& text, const PositionOptions& opti
 }
 
 }  // namespace
+
+std::string names_of_header(const PositionText& text) {
+  if (text.binary || text.lines.empty()) return "";
+  const ColumnHeader header = column_header(text);
+  const auto number = [&](const std::string& name) { return is_number(with_decimal_point(name, header.separator)); };
+  const bool list = header.separator != Separator::kBlanks && header.names.size() > 2;
+  return list && std::ranges::none_of(header.names, number) ? quoted_names(header.names) : "";
+}
 
 const PositionFormat kNamedColumns = {"columns", "table with a header", has_columns, read_columns};
 

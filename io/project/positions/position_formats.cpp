@@ -29,8 +29,13 @@ const PositionFormat& chosen_format(const PositionText& text, const PositionOpti
   if (options.format.empty() && !options.columns.empty()) return kNamedColumns;
   if (options.format.empty()) {
     if (const PositionFormat* format = recognise_positions(text)) return *format;
-    throw InputError(text.path + ": is in no format of positions that is known (" + format_names() +
-                     "); name the columns of a table with 'columns', or the format with 'format'");
+    const std::string names = names_of_header(text);
+    throw InputError(text.path + ": is in no format of positions that is known (" + format_names() + ")" +
+                     (names.empty()
+                          ? "; name the columns of a table with 'columns', or the format with 'format'"
+                          : "; its columns are " + names +
+                                ", of which none, or too few, are known as image and position; say which they are with "
+                                "'columns: {image: ..., x: ..., y: ..., z: ...}'"));
   }
   for (const PositionFormat* format : position_formats())
     if (format->name == options.format) {

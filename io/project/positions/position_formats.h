@@ -41,6 +41,10 @@ extern const PositionFormat kTum;           // tum_trajectory.cpp
 extern const PositionFormat kKitti;         // kitti_poses.cpp
 extern const PositionFormat kNamedColumns;  // named_columns.cpp
 
+// The names of the columns of a table for messages, "'Bild', 'Ost', 'Nord'"; empty if its first line is no list of
+// names.
+std::string names_of_header(const PositionText& text);
+
 // The table, in the order in which formats are tried.
 const std::vector<const PositionFormat*>& position_formats();
 

@@ -379,6 +379,12 @@ TEST_F(InitFinds, FilesBesideTheImages) {
   EXPECT_EQ(read_project(folder_.path("block.yaml")).block.control_points.size(), 1U);
 }
 
+TEST_F(InitFinds, TablesThatAreNamedGeo) {
+  write_file(folder_.path("geo.txt"), "name,lat,lon,height\n100_0001_0001.JPG,46.84,-91.99,203\n");
+  EXPECT_THAT(summary(), HasSubstr("\nfound: positions: geo.txt (table with a header)"));
+  EXPECT_THAT(project(), HasSubstr("\npositions: \"geo.txt\"  # table with a header\n"));
+}
+
 TEST_F(InitFinds, ExposuresWithTheSolutionOfTheirFlight) {
   std::string mrk, pos = "%  GPST latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m)\n";
   for (int e = 0; e < 4; ++e)

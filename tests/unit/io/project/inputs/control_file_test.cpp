@@ -178,6 +178,12 @@ TEST_F(ControlFile, CsvRefusals) {
   const std::string header = "name,x,y,z,image,column_px,row_px\n";
   EXPECT_THAT(refusal("c.csv", "# crs: EPSG:123456\n" + header), HasSubstr("c.csv: coordinate reference system 'EPSG"));
   EXPECT_THAT(refusal("c.csv", "name,x,y\n"), HasSubstr("c.csv:1: column 'z' is missing"));
+  EXPECT_EQ(refusal("c.csv", "name,x,z,y\nP1,1,2,3\n"),
+            "c.csv:1: column 'image' is missing; each point needs its marks in images, one line for each: image, "
+            "column_px, row_px; the header needs name,x,y,z,image,column_px,row_px, and has name,x,z,y");
+  EXPECT_EQ(refusal("c.csv", "name,x,y,image,column_px,row_px\n"),
+            "c.csv:1: column 'z' is missing; the header needs name,x,y,z,image,column_px,row_px, and has "
+            "name,x,y,image,column_px,row_px");
   EXPECT_THAT(refusal("c.csv", "name,x,y,z,image,column_px,row_px,sigma_mm\n"), HasSubstr("unknown key 'sigma_mm'"));
   EXPECT_THAT(refusal("c.csv", header + "a,1,2,3,sub/0.jpg,x,4\n"),
               HasSubstr("c.csv:2: column_px: 'x' is not a number"));

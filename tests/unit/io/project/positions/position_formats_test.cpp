@@ -305,6 +305,18 @@ TEST_F(PositionFormats, ColumnsThatTheProjectNames) {
               HasSubstr("t.csv: columns.image: the header has no column 'Foto'"));
 }
 
+TEST_F(PositionFormats, RefusalsListTheNamesOfTheHeader) {
+  const std::string german = "Bild;Rechtswert;Hochwert;Hoehe\n1.jpg;500000,5;5300000;600\n";
+  EXPECT_THAT(refusal("t.csv", german),
+              HasSubstr("; its columns are 'Bild', 'Rechtswert', 'Hochwert', 'Hoehe', of which "
+                        "none, or too few, are known as image and position; say which they "
+                        "are with 'columns: {image: ..., x: ..., y: ..., z: ...}'"));
+  EXPECT_THAT(refusal("t.csv", german, {.columns = {{"image", "Bild"}}}),
+              HasSubstr("t.csv:1: the header names no columns of image (or time) and position; its names are 'Bild', "
+                        "'Rechtswert', 'Hochwert', 'Hoehe'; name them in the project file: "));
+  EXPECT_THAT(refusal("t.csv", german, {.format = "columns"}), HasSubstr("its names are 'Bild', 'Rechtswert'"));
+}
+
 TEST_F(PositionFormats, AreToldApartByTheirContents) {
   EXPECT_EQ(format_of("a.txt", kGeo), "odm_geo");
   EXPECT_EQ(format_of("a.txt", "WGS84 UTM 15N\nDJI_0028.JPG,576700,5188000,198\n"), "odm_geo");
