@@ -111,8 +111,10 @@ void warn_of_local_control(const YamlReader& top, const ControlTable& control, P
 // cameras and frames; rigs join frames; a calibration needs cameras and mounts. Poses and control are read before the
 // positions, because they may give the origin, but are added after them: only then is the ground frame known. Attitudes
 // need the positions, for the vertical at each of them.
-void read_block_sections(YamlReader& top, Project& project, const std::vector<SettingsSection>& sections,
-                         const std::optional<GroundFrame>& ground) {
+// Returns the table of `control`.
+std::optional<ControlTable> read_block_sections(YamlReader& top, Project& project,
+                                                const std::vector<SettingsSection>& sections,
+                                                const std::optional<GroundFrame>& ground) {
   const auto images = top.existing_folder("images");
   const auto block_file = top.existing_file("block");
   if (images && block_file)
@@ -156,7 +158,7 @@ void read_block_sections(YamlReader& top, Project& project, const std::vector<Se
   read_calibration(top, project);
 
   const auto poses = read_poses(top);
-  const auto control = read_control(top);
+  auto control = read_control(top);
   const Trajectories trajectories = read_trajectories(top, scanned, names_left_out(project), project);
   std::vector<Geodetic> others = trajectories.places();
   if (poses && others.empty()) others = poses->positions();
@@ -183,6 +185,7 @@ void read_block_sections(YamlReader& top, Project& project, const std::vector<Se
       read_frame_measurements(type, *file, names_left_out(project), project.block, project.warnings);
   if (const auto verticals = top.existing_file("verticals"))
     read_verticals(*verticals, names_left_out(project), project.block);
+  return control;
 }
 
 }  // namespace
@@ -197,14 +200,14 @@ Project read_project(const std::string& path, const std::vector<SettingsSection>
   project.file = fs::absolute(path).lexically_normal().string();
   YamlReader top = read_yaml(path);
   project.settings = read_stage_settings(top, sections);
-  read_block_sections(top, project, sections, ground);
+  const std::optional<ControlTable> control = read_block_sections(top, project, sections, ground);
   top.finish();
   try {
     check(project.block);
   } catch (const InputError& error) {
     throw InputError(project.file + ": " + error.what());
   }
-  warn_of_distant_places(project);
+  check_distant_places(control, project);
   warn_of_unknown_motion(project);
   return project;
 }

@@ -55,8 +55,10 @@ void read_attitudes(YamlReader& top, const std::vector<ScannedImage>& scanned, c
                     Project& project);
 
 // Warns if the origin or a control point is more than 50 km (and more than a tenth of the block's extent) away from the
-// images.
-void warn_of_distant_places(Project& project);
+// images. Throws InputError for control points that are also more than ten extents away: they would move the block.
+// `control`: the table of the project file, whose points are the last ones of the block; nothing: all are the block's
+// own.
+void check_distant_places(const std::optional<ControlTable>& control, Project& project);
 // Warns of cameras with a `readout_ms` of the project whose images have no times. Their motion is not known then.
 void warn_of_unknown_motion(Project& project);
 

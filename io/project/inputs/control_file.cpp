@@ -286,9 +286,7 @@ bool begins_with_system(const std::string& path) {
   return false;
 }
 
-}  // namespace
-
-ControlTable read_control_table(const std::string& path) {
+ControlTable read_format(const std::string& path) {
   const std::string extension = lower_case(std::filesystem::path(path).extension().string());
   if (extension == ".csv" && !begins_with_system(path)) return read_csv(path);
   if (extension != ".json") return read_gcp_list(path);
@@ -296,6 +294,14 @@ ControlTable read_control_table(const std::string& path) {
   std::ostringstream text;
   text << stream.rdbuf();
   return read_json(text.str(), path);
+}
+
+}  // namespace
+
+ControlTable read_control_table(const std::string& path) {
+  ControlTable table = read_format(path);
+  table.path = path;
+  return table;
 }
 
 void write_control_csv(const std::string& path, const Block& block) {

@@ -24,6 +24,7 @@
 //     normalised, origin in the middle of the image  (u, v) = max(w, h) (x, y) + (w, h) / 2
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,7 @@ struct ControlTable {
     std::string where;
   };
   enum class Pixels { kCentresAtHalf, kCentresAtInteger, kNormalised } pixels = Pixels::kCentresAtHalf;
+  std::string path;                      // of the file
   std::string crs = "local", crs_where;  // crs_where: the file, with the line if a line names the system
   std::vector<Point> points;
   std::vector<std::string> warnings;  // about points that were left out
@@ -66,6 +68,10 @@ std::vector<Geodetic> geodetic_positions(const ControlTable& table);
 // coordinates that do not fit the block's frame.
 void add_control(const ControlTable& table, const std::vector<std::string>& left_out, Block& block,
                  std::vector<std::string>& warnings);
+
+// Where the points would lie in the block's ground frame if x and y of the file were exchanged (longitude and latitude,
+// easting and northing); nothing for a point that the system has no such place for.
+std::vector<std::optional<Eigen::Vector3d>> exchanged_places(const ControlTable& table, const Block& block);
 
 // Writes the CSV format above, with coordinates in the block's ground frame ("local").
 void write_control_csv(const std::string& path, const Block& block);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <set>
+#include <utility>
 
 #include "io/base/error.h"
 #include "io/block/held_priors.h"
@@ -165,6 +166,20 @@ void add_control(const ControlTable& table, const std::vector<std::string>& left
   }
   absent.report(used, warnings);
   warnings.insert(warnings.end(), table.warnings.begin(), table.warnings.end());
+}
+
+std::vector<std::optional<Eigen::Vector3d>> exchanged_places(const ControlTable& table, const Block& block) {
+  const ToGround to_ground(table, block.ground);
+  std::vector<std::optional<Eigen::Vector3d>> places;
+  for (ControlTable::Point point : table.points) {
+    std::swap(point.coordinates.x(), point.coordinates.y());
+    try {
+      places.emplace_back(to_ground(point));
+    } catch (const InputError&) {
+      places.emplace_back();
+    }
+  }
+  return places;
 }
 
 }  // namespace megablock

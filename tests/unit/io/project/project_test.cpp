@@ -304,7 +304,7 @@ TEST(Project, WarnsOfPosesFarFromThePositions) {
   Project project;
   Block& block = project.block;
   block = simulate_block(SimulationOptions{.frames = 30}).block;
-  warn_of_distant_places(project);
+  check_distant_places({}, project);
   EXPECT_THAT(project.warnings, IsEmpty());
   const auto move = [&](double metres) {
     for (Frame& frame : block.frames) {
@@ -312,7 +312,7 @@ TEST(Project, WarnsOfPosesFarFromThePositions) {
       frame.given_pose->centre.y() += metres;
     }
     project.warnings.clear();
-    warn_of_distant_places(project);
+    check_distant_places({}, project);
   };
   move(200);  // drift of an inertial system
   EXPECT_THAT(project.warnings, IsEmpty());

@@ -296,6 +296,27 @@ TEST_F(ControlFile, MeasurementsInImagesLeftOutAreWarnings) {
                                     "image 'broken.jpg' was left out")));
 }
 
+TEST_F(ControlFile, PointsFarFromTheImagesAreRefused) {
+  const std::string right = "13.4 52.52 40 7 8 sub/2.jpg right\n";
+  EXPECT_THAT(
+      refusal("gcp_list.txt", "WGS84\n52.52 13.4 40 5 6 sub/0.jpg a\n52.5201 13.4 40 9 9 sub/1.jpg b\n" + right),
+      ::testing::MatchesRegex("gcp_list.txt: 2 of 3 control points \\('a', 'b'\\) lie [0-9]+ km \\(median\\) from the "
+                              "images; with x and y .* exchanged they would lie near the images; exchange these .*"));
+  EXPECT_THAT(
+      refusal("gcp_list.txt", "EPSG:32632\n391430.5 5820112.25 45.5 10.5 20 sub/0.jpg a\n"),
+      ::testing::MatchesRegex("gcp_list.txt: 1 of 1 control points \\('a'\\) lie 4[0-9]+ km from the images; its "
+                              "coordinates are probably in another coordinate reference system than "
+                              "'EPSG:32632'; correct .*"));
+  EXPECT_THAT(
+      refusal("c.csv", "name,x,y,z,image,column_px,row_px\na,391430.5,5820112.25,45,sub/0.jpg,3,4\n"),
+      HasSubstr("c.csv: 1 of 1 control points ('a') lie 5833 km from the images; the coordinates of the file are "
+                "local and count from the origin of the block; name their system"));
+  write_file(folder_.path("gcp_list.txt"), "WGS84\n" + right);
+  write_file(folder_.path("block.yaml"), "images: images\norigin: [51, 10, 40]\ncontrol: gcp_list.txt\n");
+  EXPECT_THAT(read_project(folder_.path("block.yaml")).warnings, ElementsAre(HasSubstr("the origin lies ")))
+      << "the control fits the images";
+}
+
 TEST_F(ControlFile, SettingsOfTheProjectOverrideTheFile) {
   read("gcp_list.txt", "WGS84\n13.4 52.52 40 5 6 sub/0.jpg a\n13.4001 52.52 NaN 5 6 sub/0.jpg b\n");
   const auto with = [&](const std::string& control) {
