@@ -13,13 +13,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "adjust/orientation/straight_line.h"
 #include "adjust/terms/line_terms.h"
 #include "adjust/terms/linearise.h"
 #include "adjust/terms/prior_loss.h"
 #include "adjust/terms/vertical_terms.h"
 #include "geometry/numbers/angles.h"
 #include "geometry/numbers/decompositions.h"
+#include "geometry/numbers/straight_line.h"
 
 namespace megablock {
 

@@ -14,9 +14,9 @@
 #include <span>
 
 #include "adjust/coplanarity/coplanarity_equations.h"
-#include "adjust/orientation/straight_line.h"
 #include "geometry/intersection/triangulation.h"
 #include "geometry/numbers/decompositions.h"
+#include "geometry/numbers/straight_line.h"
 
 namespace megablock {
 

@@ -22,9 +22,9 @@
 #include <utility>
 
 #include "adjust/orientation/steps/levelling.h"
-#include "adjust/orientation/straight_line.h"
 #include "adjust/tile/consistent_rays.h"
 #include "geometry/numbers/median.h"
+#include "geometry/numbers/straight_line.h"
 #include "geometry/similarity/minimal_control.h"
 #include "geometry/similarity/minimal_similarity.h"
 #include "io/block/held_priors.h"

@@ -1,4 +1,4 @@
-#include "adjust/orientation/straight_line.h"
+#include "geometry/numbers/straight_line.h"
 
 #include "geometry/numbers/decompositions.h"
 
