@@ -262,7 +262,10 @@ class ControlAligner {
     for (const Eigen::Vector3d& place : places) scatter += (place - mean) * (place - mean).transpose();
     const auto line = straight_line(scatter);
     if (!line) return false;
-    const Eigen::Vector3d down = which_points_down(mean_axes(similarity), *line, distance(similarity));
+    MeanAxes axes = mean_axes(block_, state_, frames_);
+    axes.view = similarity.rotation * axes.view;
+    axes.down = similarity.rotation * axes.down;
+    const Eigen::Vector3d down = which_points_down(axes, *line, distance(similarity));
     const Eigen::Quaterniond turn = turn_about(*line, down, -Eigen::Vector3d::UnitZ());
     similarity.translation = mean + turn * (similarity.translation - mean);
     similarity.rotation = (turn * similarity.rotation).normalized();
@@ -274,24 +277,6 @@ class ControlAligner {
     if (pairs.model.empty()) return;
     similarity.scale = 1;
     similarity.translation = centroid(pairs.ground) - similarity.rotation * centroid(pairs.model);
-  }
-  MeanAxes mean_axes(const Similarity& similarity) const {
-    MeanAxes axes;
-    double count = 0;
-    for (const FrameIndex frame : frames_) {
-      if (!state_.oriented[frame]) continue;
-      const RigIndex rig = block_.frames[frame].rig;
-      for (std::size_t m = 0; m < block_.rigs[rig].cameras().size(); ++m) {
-        const Eigen::Quaterniond turn =
-            similarity.rotation * camera_pose(state_.frames[frame], state_.mounts[rig][m]).rotation.conjugate();
-        axes.view += turn * Eigen::Vector3d::UnitZ();
-        axes.down += turn * Eigen::Vector3d::UnitY();
-        ++count;
-      }
-    }
-    axes.view /= count;
-    axes.down /= count;
-    return axes;
   }
   // The median distance of the control points from the images that see them, metres.
   double distance(const Similarity& similarity) const {

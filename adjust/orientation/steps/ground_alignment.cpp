@@ -13,28 +13,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "adjust/orientation/steps/levelling.h"
 #include "geometry/numbers/decompositions.h"
 #include "geometry/numbers/median.h"
 
 namespace megablock {
 
 namespace {
-
-// The mean axes of the oriented images.
-MeanAxes mean_axes(const OrientationGraph& graph, const OrientationValues& values) {
-  MeanAxes result;
-  double count = 0;
-  for (std::size_t i = 0; i < graph.images.size(); ++i) {
-    const auto camera = values.camera(graph, static_cast<std::int32_t>(i));
-    if (!camera) continue;
-    result.view += camera->rotation.conjugate() * Eigen::Vector3d::UnitZ();
-    result.down += camera->rotation.conjugate() * Eigen::Vector3d::UnitY();
-    ++count;
-  }
-  if (count > 0) result.view /= count, result.down /= count;
-  return result;
-}
 
 // The part of a rotation that is not about the axis (swing of the swing-twist decomposition).
 Eigen::Quaterniond without_twist(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& axis) {
@@ -85,6 +69,20 @@ KnownPositions known_positions(const OrientationGraph& graph, const OrientationV
 }
 
 }  // namespace
+
+MeanAxes mean_axes(const OrientationGraph& graph, const OrientationValues& values) {
+  MeanAxes result;
+  double count = 0;
+  for (std::size_t i = 0; i < graph.images.size(); ++i) {
+    const auto camera = values.camera(graph, static_cast<std::int32_t>(i));
+    if (!camera) continue;
+    result.view += camera->rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    result.down += camera->rotation.conjugate() * Eigen::Vector3d::UnitY();
+    ++count;
+  }
+  if (count > 0) result.view /= count, result.down /= count;
+  return result;
+}
 
 GroundAngles known_angles(const OrientationGraph& graph) {
   for (const auto& frame : graph.frames)

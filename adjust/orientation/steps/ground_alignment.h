@@ -3,6 +3,7 @@
 // Internal to adjust/: it is not installed.
 #pragma once
 
+#include "adjust/orientation/steps/levelling.h"
 #include "adjust/orientation/steps/track_intersection.h"
 #include "geometry/similarity/similarity.h"
 #include "geometry/vanishing/interpretation_plane.h"
@@ -29,6 +30,9 @@ std::optional<AxisDirection> down_by_positions(const OrientationGraph& graph, co
 //    others the y axis of the camera is taken to point down (street).
 std::optional<Similarity> similarity_to_ground(const OrientationGraph& graph, const OrientationValues& values,
                                                double median_distance, GroundAngles known);
+
+// The mean axes of the images of oriented frames, in the axes of `values`.
+MeanAxes mean_axes(const OrientationGraph& graph, const OrientationValues& values);
 
 // The share of the known positions that a similarity brings within four sigmas of the centres of their frames. The
 // sigmas allow for the bend of first centres, a twentieth of the extent of the positions.

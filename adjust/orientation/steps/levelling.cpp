@@ -4,6 +4,23 @@
 
 namespace megablock {
 
+MeanAxes mean_axes(const Block& block, const BlockState& state, const std::vector<FrameIndex>& frames) {
+  MeanAxes axes;
+  double count = 0;
+  for (const FrameIndex frame : frames) {
+    if (!state.oriented[frame]) continue;
+    const RigIndex rig = block.frames[frame].rig;
+    for (std::size_t m = 0; m < block.rigs[rig].cameras().size(); ++m) {
+      const Eigen::Quaterniond turn = camera_pose(state.frames[frame], state.mounts[rig][m]).rotation.conjugate();
+      axes.view += turn * Eigen::Vector3d::UnitZ();
+      axes.down += turn * Eigen::Vector3d::UnitY();
+      ++count;
+    }
+  }
+  if (count > 0) axes.view /= count, axes.down /= count;
+  return axes;
+}
+
 Eigen::Quaterniond turn_about(const Eigen::Vector3d& axis, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const double sine = axis.dot(from.cross(to));
   const double cosine = from.dot(to) - axis.dot(from) * axis.dot(to);

@@ -3,6 +3,9 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <vector>
+
+#include "io/block/block.h"
 
 namespace megablock {
 
@@ -11,6 +14,9 @@ namespace megablock {
 struct MeanAxes {
   Eigen::Vector3d view = Eigen::Vector3d::Zero(), down = Eigen::Vector3d::Zero();
 };
+
+// Those of the images of the oriented frames, in the axes of the state.
+MeanAxes mean_axes(const Block& block, const BlockState& state, const std::vector<FrameIndex>& frames);
 
 // The rotation about the unit axis that brings the part of `from` across the axis onto that of `to`.
 Eigen::Quaterniond turn_about(const Eigen::Vector3d& axis, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
