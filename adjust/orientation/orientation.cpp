@@ -4,9 +4,8 @@
 //     first_centres()    directions and lengths of the baselines, and centres from them, up to a similarity
 //     check_verticals()  wrong verticals are set aside; the first two steps are repeated with the others
 //     to_ground()        a similarity to the observed positions; the centres are solved once more with them
-//     shape_by_images()  instead of it where fewer than half of the positions fit: the steps below without positions,
-//     then the
-//                        similarity
+//     shape_by_images()  instead of it where fewer than half of the positions fit, or where they turn the block over:
+//                        the steps below without positions, then the similarity, unless the positions are mirrored
 //     position()         centres and points from the rays alone, rotations held
 //     adjust()           three adjustments of everything, with limits of 25, 10 and 4 px
 //
@@ -20,6 +19,7 @@
 #include <sstream>
 
 #include "adjust/orientation/graph_verticals.h"
+#include "adjust/orientation/mirrored_lists.h"
 #include "adjust/orientation/orientation_parts.h"
 #include "adjust/orientation/steps/baselines.h"
 #include "adjust/orientation/steps/coarse_adjustment.h"
@@ -208,19 +208,25 @@ class Orientation {
 
   // A narrow image hardly tells a small turn from a shift, so that the first centres of such images may be bent until
   // hardly any position fits them, and the few that fit would turn the block anyhow. The images together give the shape
-  // of the block then, and the positions its place. Returns whether this was needed and more positions fit in the end;
-  // otherwise nothing changes.
+  // of the block then, and the positions its place. Positions with east and north exchanged turn a flat block over, or
+  // do not fit: where the shape shows them to be mirrored, the block stays free. Returns whether this was needed, and
+  // the positions are mirrored or more of them fit in the end; otherwise nothing changes.
   bool shape_by_images(const Similarity& of_first_centres) {
     constexpr double kMost = 0.5;  // share of the positions
     const double first = share_that_fits(graph_, values_, of_first_centres);
-    if (first >= kMost) return false;
+    const bool fits = first >= kMost;
+    if (fits && !turns_over(of_first_centres)) return false;
     const OrientationValues values = values_;
     const std::vector<std::string> reasons = reasons_;
     try {
       position();
       adjust();
+      if (mirrored_positions()) {
+        move(similarity_to_free_frame(graph_, values_, known_angles_, metric_rigs()));
+        return true;
+      }
       const auto similarity = similarity_of_points();
-      if (similarity && share_that_fits(graph_, values_, *similarity) > first) {
+      if (!fits && similarity && share_that_fits(graph_, values_, *similarity) > first) {
         move(*similarity);
         in_ground_ = true;
         return true;
@@ -232,6 +238,21 @@ class Orientation {
     reasons_ = reasons;
     rays_ = viewing_rays(graph_, values_.cameras);
     return false;
+  }
+
+  // Whether the images look up, or stand on their heads, after a similarity.
+  bool turns_over(const Similarity& similarity) const {
+    constexpr double kClear = 0.3;
+    const MeanAxes axes = mean_axes(graph_, values_);
+    return (similarity.rotation * (axes.view + axes.down)).z() > kClear;
+  }
+
+  bool mirrored_positions() const {
+    std::vector<FramePosition> positions;
+    for (std::size_t f = 0; f < graph_.frames.size(); ++f)
+      if (values_.frames[f] && graph_.frames[f].position)
+        positions.push_back({values_.frames[f]->centre, *graph_.frames[f].position});
+    return find_mirrored_positions(positions, mean_axes(graph_, values_)).has_value();
   }
 
   // Transforms rotations and centres to the observed positions and solves the centres once more with these as priors.

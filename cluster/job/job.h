@@ -34,8 +34,8 @@ struct RunOptions {
 
 // The block of a run, and its large tables outside of memory. Stages read it through Job. Between their units
 // of work some change it: names come and go, focal_lengths and cameras set start values and free parameters of the
-// cameras, the orientation sets verticals aside and gives positions shifts, `register` puts an estimated rig
-// in, and the merge moves it into the result.
+// cameras, the orientation sets verticals aside, gives positions shifts and leaves mirrored lists out, `register` puts
+// an estimated rig in, and the merge moves it into the result.
 struct JobBlock {
   Block block;
   PagedTables tables;

@@ -12,6 +12,7 @@
 
 #include "adjust/orientation/control_alignment.h"
 #include "adjust/orientation/given_trajectories.h"
+#include "adjust/orientation/mirrored_lists.h"
 #include "adjust/orientation/orientation.h"
 #include "adjust/orientation/position_offset.h"
 #include "adjust/orientation/position_shifts.h"
@@ -278,27 +279,61 @@ void shift_groups(const Stage& stage, const Job& job, JobRecord& record, const s
   }
 }
 
-// Finds what contradicts the datum of each part of the block. Groups of positions that contradict the others get a
-// shift. Parts without positions are moved onto the control by a similarity, and those whose positions contradict the
-// control by one offset get it as a shift.
+// Leaves out positions whose east and north are exchanged, and returns whether they are.
+bool leave_out_mirrored_positions(const Stage& stage, const Job& job, JobRecord& record,
+                                  const std::vector<FrameIndex>& frames, Block& own, const BlockState& state) {
+  const auto mirrored = find_mirrored_positions(own, state, frames);
+  if (!mirrored) return false;
+  leave_out_positions(frames, own);
+  add_note(job, record, stage.name, mirrored_positions_text(*mirrored));
+  return true;
+}
+
+// The same of control points. `in_place`: the part has its place from positions.
+bool leave_out_mirrored_control(const Stage& stage, const Job& job, JobRecord& record,
+                                const std::vector<FrameIndex>& frames, bool in_place, Block& own,
+                                const BlockState& state) {
+  const auto mirrored = find_mirrored_control(own, state, frames, in_place);
+  if (!mirrored) return false;
+  leave_out_control(own);
+  add_note(job, record, stage.name, mirrored_control_text(*mirrored, in_place));
+  return true;
+}
+
+struct DatumPart {
+  std::vector<FrameIndex> frames;
+  bool positions = false, given_poses = false;
+};
+
+// The oriented frames that hang together, by the name of their set.
+std::map<std::int64_t, DatumPart> datum_parts(const Job& job, DisjointSets& sets, const BlockState& state) {
+  const bool use_positions = job.settings.adjustment.observations.use_position_priors;
+  std::map<std::int64_t, DatumPart> parts;
+  for (FrameIndex f(0); job.block.frames.contains(f); ++f.value) {
+    if (!state.oriented[f]) continue;
+    DatumPart& part = parts[sets.find(f.value)];
+    const Frame& frame = job.block.frames[f];
+    part.frames.push_back(f);
+    part.given_poses |= frame.given_pose.has_value();
+    part.positions |= use_positions && frame.position_prior.has_value();
+  }
+  return parts;
+}
+
+// Finds what contradicts the datum of each part of the block. Lists with east and north exchanged are left out. Groups
+// of positions that contradict the others get a shift. Parts without positions are moved onto the control by a
+// similarity, and those whose positions contradict the control by one offset get it as a shift.
 void settle_datum(const Stage& stage, const Job& job, JobRecord& record, DisjointSets& sets, Block& own,
                   BlockState& state) {
   const Block& block = job.block;
-  std::map<std::int64_t, std::vector<FrameIndex>> parts;
-  std::set<std::int64_t> with_positions, with_given_poses;
-  for (FrameIndex f(0); block.frames.contains(f); ++f.value) {
-    if (!state.oriented[f]) continue;
-    const std::int64_t part = sets.find(f.value);
-    parts[part].push_back(f);
-    const Frame& frame = block.frames[f];
-    if (frame.given_pose) with_given_poses.insert(part);
-    if (job.settings.adjustment.observations.use_position_priors && frame.position_prior) with_positions.insert(part);
-  }
-  const bool any_control =
+  bool any_control =
       std::ranges::any_of(block.control_points, [](const auto& p) { return p.role == PointRole::kControl; });
-  for (const auto& [part, frames] : parts) {
-    if (with_given_poses.contains(part)) continue;
-    if (!with_positions.contains(part)) {
+  for (const auto& [name, part] : datum_parts(job, sets, state)) {
+    const std::vector<FrameIndex>& frames = part.frames;
+    if (part.given_poses) continue;
+    const bool placed = part.positions && !leave_out_mirrored_positions(stage, job, record, frames, own, state);
+    if (any_control && leave_out_mirrored_control(stage, job, record, frames, placed, own, state)) any_control = false;
+    if (!placed) {
       if (any_control) align_part(stage, job, record, frames, state);
       continue;
     }

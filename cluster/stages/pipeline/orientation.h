@@ -17,8 +17,9 @@ struct OrientationStage {
   bool only_turned = false;                        // nearly all pairs of images show no parallax
 };
 
-// Collective. `own` is the job's block. Verticals that are set aside leave it, and positions that lie off the control
-// or off each other get a shift (position_offset.h, position_shifts.h).
+// Collective. `own` is the job's block. Verticals that are set aside leave it, and so do positions with east and north
+// exchanged; such control becomes check points (mirrored_lists.h). Positions that lie off the control or off each other
+// get a shift (position_offset.h, position_shifts.h).
 OrientationStage run_orientation(const Stage& stage, const Job& job, JobRecord& record,
                                  const std::vector<std::string>& matches, Block& own);
 

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "io/base/error.h"
 #include "tests/support/adjust/orientation_scene.h"
@@ -30,7 +31,7 @@ std::vector<Eigen::Vector3d> random_points(int count, const Eigen::Vector3d& low
 }
 
 // Nadir images 80 m above terrain of +-5 m, rows flown to and fro, small random tilts.
-SimulatedBlock aerial(int rows, int columns, const SceneOptions& options, double relief = 5) {
+SimulatedBlock aerial(int rows, int columns, const SceneOptions& options, double relief = 5, double heights = 0.5) {
   std::mt19937_64 random(3);
   std::vector<Pose> poses;
   for (int r = 0; r < rows; ++r)
@@ -38,7 +39,8 @@ SimulatedBlock aerial(int rows, int columns, const SceneOptions& options, double
       const Eigen::Vector3d down(0, r % 2 ? -1 : 1, 0);
       const Eigen::Quaterniond tilt = rotation_exp<double>(2 * kDegree * normal_vector(random));
       poses.push_back({(tilt * looking({0, 0, -1}, down)).normalized(),
-                       Eigen::Vector3d(14 * c, 30 * r, 80) + 0.5 * normal_vector(random)});
+                       Eigen::Vector3d(14 * c, 30 * r, 80) +
+                           Eigen::Vector3d(0.5, 0.5, heights).cwiseProduct(normal_vector(random))});
     }
   return make_scene(
       poses, random_points(rows * columns * 60, {-50, -50, -relief}, {14.0 * columns + 50, 30.0 * rows + 50, relief}),
@@ -165,6 +167,23 @@ TEST(Orientation, PositionsPlaceNarrowImages) {
     const PairNoise noise{.rotation_deg = rotation_deg};
     expect_oriented(scene, orient(scene, pairs_of(scene, noise)), false, 2, 2);
   }
+}
+
+// Such positions turn the block over, and its heights hardly contradict them.
+TEST(Orientation, PositionsWithEastAndNorthExchangedLeaveTheBlockFree) {
+  SceneOptions options;
+  options.gps_sigma_m = 0.05;
+  SimulatedBlock scene = aerial(4, 7, options, 5, 4);
+  const OrientationResult right = orient(scene, pairs_of(scene));
+  expect_oriented(scene, right, false, 1, 1);
+  EXPECT_THAT(right.summary, testing::HasSubstr("ground frame"));
+  for (Frame& frame : scene.block.frames) {
+    Eigen::Vector3d& position = frame.position_prior->position;
+    std::swap(position.x(), position.y());
+  }
+  const OrientationResult mirrored = orient(scene, pairs_of(scene));
+  expect_oriented(scene, mirrored, true, 0.3, 0.3);
+  EXPECT_THAT(mirrored.summary, testing::HasSubstr("free block"));
 }
 
 TEST(Orientation, SingleFlightLineLooksDown) {
