@@ -9,6 +9,7 @@
 
 #include "adjust/orientation/steps/control_marks.h"
 #include "geometry/numbers/median.h"
+#include "geometry/similarity/similarity.h"
 #include "io/block/held_priors.h"
 #include "io/block/observed_poses.h"
 #include "io/text/side_text.h"
@@ -18,8 +19,10 @@ namespace megablock {
 namespace {
 
 constexpr std::size_t kFewestPoints = 3;
-constexpr double kOfOwnSigma = 3, kOfPosition = 5, kOfScatter = 3;  // times these an offset counts
-constexpr double kNormal = 1.4826, kOfMedian = 1.2533;              // sigma over median of |r|; sigma of a median
+constexpr double kOfOwnSigma = 3, kOfScatter = 3;       // times these an offset counts
+constexpr double kCommon = 2, kOfPlace = 4;             // of the limit: times u_k and times the root of D_kk
+constexpr double kOnALine = 5;                          // times u_k in its place
+constexpr double kNormal = 1.4826, kOfMedian = 1.2533;  // sigma over median of |r|; sigma of a median
 constexpr double kLoose = 10;  // lengths of an offset: the sigma of a shift that shall tell nothing
 constexpr double kKnown = kUnknownHeightSigma / 2;  // metres
 
@@ -49,9 +52,36 @@ Difference difference_of(const Comparison& c, double focal_share) {
   return found;
 }
 
-bool counts(const Difference& d, double position_sigma) {
-  return std::abs(d.offset) > std::max({kOfOwnSigma * d.sigma, kOfPosition * position_sigma, kOfScatter * d.scatter});
+bool counts(const Difference& d, double place_limit) {
+  return std::abs(d.offset) > std::max({kOfOwnSigma * d.sigma, kOfScatter * d.scatter, place_limit});
 }
+
+// The observed positions, and what they say of the place of the block.
+struct Placed {
+  std::vector<Eigen::Vector3d> centres;
+  std::vector<double> weights;  // by the largest sigma of each: mostly that of the height, which tilts the block
+  std::array<std::vector<double>, 3> sigmas;
+
+  void add(const Eigen::Vector3d& centre, const Eigen::Vector3d& sigma) {
+    for (int k = 0; k < 3; ++k)
+      if (sigma[k] < kKnown) sigmas[static_cast<std::size_t>(k)].push_back(sigma[k]);
+    if (!(sigma.maxCoeff() < kKnown)) return;
+    centres.push_back(centre);
+    weights.push_back(1 / (sigma.maxCoeff() * sigma.maxCoeff()));
+  }
+  // The limits p of a place. Positions on a line leave the tilt to other observations.
+  Eigen::Vector3d limit_at(const Eigen::Vector3d& place) const {
+    std::vector<Eigen::Vector3d> from_place;
+    for (const Eigen::Vector3d& centre : centres) from_place.push_back(centre - place);
+    const auto covariance = similarity_covariance(Similarity(), from_place, weights);
+    Eigen::Vector3d limit;
+    for (int k = 0; k < 3; ++k) {
+      const double one = median(sigmas[static_cast<std::size_t>(k)]);
+      limit[k] = covariance ? kCommon * one + kOfPlace * std::sqrt((*covariance)(4 + k, 4 + k)) : kOnALine * one;
+    }
+    return limit;
+  }
+};
 
 // The prior sigma of the focal length over itself, the largest of the cameras that see control.
 double focal_share_of(const Block& block) {
@@ -74,14 +104,14 @@ Eigen::Vector3d mean_centre(const std::vector<PointView>& marks) {
 
 std::optional<PositionOffset> find_position_offset(const Block& block, const BlockState& state,
                                                    const std::vector<FrameIndex>& frames) {
-  std::array<std::vector<double>, 3> position_sigmas;
+  Placed placed;
   std::array<Comparison, 3> compared;
+  std::array<std::vector<double>, 3> places;  // of the control
   for (const FrameIndex frame : frames) {
     if (!has_position(block, state, frame)) continue;
     const PositionPrior& prior = *block.frames[frame].position_prior;
     if (held(prior)) return std::nullopt;
-    for (std::size_t k = 0; k < 3; ++k)
-      if (const double sigma = prior.sigma[static_cast<int>(k)]; sigma < kKnown) position_sigmas[k].push_back(sigma);
+    placed.add(state.frames[frame].centre, prior.sigma);
   }
   for (const ControlPoint& point : block.control_points) {
     if (point.role != PointRole::kControl) continue;
@@ -89,6 +119,7 @@ std::optional<PositionOffset> find_position_offset(const Block& block, const Blo
     if (!seen.place) continue;
     const Eigen::Vector3d view = *seen.place - mean_centre(seen.marks);
     for (int k = 0; k < 3; ++k) {
+      places[static_cast<std::size_t>(k)].push_back((*seen.place)[k]);
       if (!std::isfinite(point.position[k]) || !(point.sigma[k] < kKnown)) continue;
       Comparison& c = compared[static_cast<std::size_t>(k)];
       c.differences.push_back((*seen.place)[k] - point.position[k]);
@@ -97,12 +128,13 @@ std::optional<PositionOffset> find_position_offset(const Block& block, const Blo
     }
   }
   const double focal_share = focal_share_of(block);
+  const Eigen::Vector3d limit = placed.limit_at({median(places[0]), median(places[1]), median(places[2])});
   PositionOffset found;
   for (int k = 0; k < 3; ++k) {
     const auto axis = static_cast<std::size_t>(k);
-    if (compared[axis].differences.size() < kFewestPoints || position_sigmas[axis].empty()) continue;
+    if (compared[axis].differences.size() < kFewestPoints || placed.sigmas[axis].empty()) continue;
     const Difference d = difference_of(compared[axis], focal_share);
-    if (!counts(d, median(position_sigmas[axis]))) continue;
+    if (!counts(d, limit[k])) continue;
     found.offset[k] = d.offset;
     found.sigma[k] = d.sigma;
     found.points = std::max(found.points, std::ssize(compared[axis].differences));

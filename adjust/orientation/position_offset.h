@@ -7,13 +7,21 @@
 //
 //     o_k = med d_ik,   d_i = X_i - G_i,   s_k = 1.4826 med |d_ik - o_k|,
 //     sigma_k^2 = 1.2533^2 max(s_k, q_k)^2 / n + (v_k sigma_f / f)^2,
+//     p_k = 2 u_k + 4 sqrt(D_kk),
 //
 // with G_i the given coordinates and q_k the median of their sigmas. The medians tolerate outliers at nearly half of
 // the n points. v is the median vector from the cameras to the points and sigma_f / f the prior sigma of the focal
 // length: the cameras have their places from the positions, so a focal length that is 1 % too long puts the ground 1 %
-// of the flying height too low, at every point alike. A coordinate counts when it is three times its own sigma and five
-// times that of a position, and three times the scatter s_k: what differs by less is left to the weights, and what
-// differs from point to point is a bend of the block, and no offset.
+// of the flying height too low, at every point alike.
+//
+// p_k is the limit of what the positions leave open at the control: D is the covariance of its middle by the similarity
+// of all positions, because a tilt moves the ground of a narrow block by more than its cameras. Errors of GNSS are
+// common to a flight in part, so that the sigma u_k of one position counts twice, however many they are. Positions on a
+// line say nothing of the tilt, and p_k is 5 u_k.
+//
+// A coordinate counts when it is more than three times its own sigma, than three times the scatter s_k and than p_k:
+// what differs by less is left to the weights, and what differs from point to point is a bend of the block, and no
+// offset.
 //
 // The control decides on the datum: the block is moved by -o, and the offset is the start of an unknown of the
 // adjustment, the shift that all positions have in common (io/block/observed_poses.h). They tell of one another as

@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <random>
+
+#include "adjust/orientation/control_alignment.h"
 #include "io/block/observed_poses.h"
 #include "io/simulate/blocks/simulate.h"
 
@@ -84,6 +87,59 @@ TEST(PositionOffset, DoesNotCountWithinTheSigmas) {
   OffsetBlock bent({0, 0, 1});
   for (std::size_t i = 0; i < 7; ++i) bent.block.control_points[i].position.z() += 0.5 * static_cast<double>(i);
   EXPECT_FALSE(bent.find());
+}
+
+// Eighteen positions of an ordinary receiver, 3 m and 6 m, and eight control points. The receiver's errors have a part
+// in common, `bias` of the sigmas; the block has its datum from the positions.
+struct OrdinaryBlock {
+  Block block;
+  BlockState state;
+  std::vector<FrameIndex> frames;
+
+  OrdinaryBlock(double heights_m, double bias, std::uint64_t seed) {
+    SimulationOptions options;
+    options.frames = 18;
+    options.points_per_frame = 20;
+    options.control_points = 8;
+    options.control_sigma_m = 0.02;
+    options.gps_sigma_m = 0.02;
+    options.image_noise_px = 0.5;
+    options.seed = seed;
+    SimulatedBlock simulated = simulate_block(options);
+    block = std::move(simulated.block);
+    state = simulated.truth;
+    for (Camera& camera : block.cameras) camera.prior_sigma[kFocal] = 0.02 * camera.intrinsics[kFocal];
+    const Eigen::Vector3d sigma(3, 3, 6);
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    std::vector<Eigen::Vector3d> centres, positions;
+    for (FrameIndex f(0); block.frames.contains(f); ++f.value) {
+      const double east = normal(random), north = normal(random), up = normal(random);
+      const Eigen::Vector3d error =
+          sigma.cwiseProduct(Eigen::Vector3d(east, north, up) + Eigen::Vector3d::Constant(bias));
+      centres.push_back(state.frames[f].centre);
+      positions.push_back(centres.back() + error + Eigen::Vector3d(0, 0, heights_m));
+      if (!block.frames[f].position_prior) block.frames[f].position_prior = PositionPrior{};
+      block.frames[f].position_prior->position = positions.back();
+      block.frames[f].position_prior->sigma = sigma;
+      frames.push_back(f);
+    }
+    const auto by_positions = fit_similarity(centres, positions);
+    EXPECT_TRUE(by_positions);
+    move_frames(*by_positions, frames, state);
+  }
+  std::optional<PositionOffset> find() const { return find_position_offset(block, state, frames); }
+};
+
+// Many positions place a block better than one of them, as far as their errors have nothing in common.
+TEST(PositionOffset, OfHeightsIsFoundByAnOrdinaryReceiver) {
+  int found = 0, alarms = 0;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    found += OrdinaryBlock(31, 0, seed).find().has_value();
+    for (const double bias : {-1.0, 0.0, 1.0}) alarms += OrdinaryBlock(0, bias, seed).find().has_value();
+  }
+  EXPECT_GE(found, 180);
+  EXPECT_EQ(alarms, 0);
 }
 
 TEST(PositionOffset, NeedsThreePointsAndPositionsThatMayMove) {
