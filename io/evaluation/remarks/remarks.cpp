@@ -15,6 +15,7 @@
 #include "io/evaluation/receivers.h"
 #include "io/evaluation/remarks/camera_remarks.h"
 #include "io/evaluation/remarks/control_remarks.h"
+#include "io/evaluation/remarks/upward_remark.h"
 #include "io/evaluation/used_sigmas.h"
 #include "io/result/result_option.h"
 #include "io/text/counted.h"
@@ -372,6 +373,7 @@ std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& 
 
 std::vector<std::string> remarks(const BlockResult& result, const report::Figures& figures) {
   std::vector<std::string> lines = datum_texts(result, figures);
+  if (std::string text = upward_text(result); !text.empty()) lines.push_back(std::move(text));
   for (std::string& text : camera_texts(result)) lines.push_back(std::move(text));
   if (std::string text = sigma_naught_text(result); !text.empty()) lines.push_back(std::move(text));
   for (std::string& text : misstated_texts(result)) lines.push_back(std::move(text));

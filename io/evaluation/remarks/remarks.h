@@ -41,7 +41,7 @@ std::string near_limit_text(const BlockResult& result, const report::Figures& fi
 // deviations. The factor is sqrt(chi2 / r) with the redundancy r, and its standard deviation is about 1 / sqrt(2 r).
 double chance_of_factor(double redundancy);
 
-// All remarks of this file and of control_remarks.h, one line each.
+// All remarks of this file, of camera_remarks.h, control_remarks.h and upward_remark.h, one line each.
 std::vector<std::string> remarks(const BlockResult& result);
 std::vector<std::string> remarks(const BlockResult& result, const TrackBatches& tracks);
 std::vector<std::string> remarks(const BlockResult& result, const report::Figures& figures);
