@@ -4,6 +4,7 @@
 
 #include <functional>
 
+#include "geometry/numbers/median.h"
 #include "io/evaluation/used_sigmas.h"
 #include "io/result/result_option.h"
 #include "io/text/counted.h"
@@ -81,6 +82,7 @@ namespace {
 // A control or check point, with its difference from the given position.
 struct WrongPoint {
   const ControlPoint* point = nullptr;
+  Eigen::Vector3d off = Eigen::Vector3d::Zero(), sigma = Eigen::Vector3d::Zero();  // adjusted - given; metres
   double sigmas = 0, metres = 0, worst_px = 0;
   bool aside = false;  // the adjustment left its position out
 };
@@ -96,6 +98,8 @@ WrongPoint difference_of(const BlockResult& result, const ControlPoint& given,
     double variance = sigma[axis] * sigma[axis];
     if (given.role == PointRole::kCheck) variance += control.covariance(axis, axis);
     if (!std::isfinite(difference) || !std::isfinite(variance)) continue;
+    wrong.off[axis] = difference;
+    wrong.sigma[axis] = std::sqrt(variance);
     wrong.sigmas = std::hypot(wrong.sigmas, difference / std::sqrt(variance));
     wrong.metres = std::hypot(wrong.metres, difference);
   }
@@ -212,16 +216,50 @@ std::string rejected_marks_text(const BlockResult& result) {
   return text;
 }
 
+bool positions_place(const BlockResult& result) {
+  return option_of(result, "adjustment.use_position_priors") != "false" &&
+         std::ranges::any_of(result.block.frames, [](const Frame& frame) { return frame.position_prior.has_value(); });
+}
+
+// Where all control and check points, three or more, are off by one vertical vector, their heights and those of the
+// positions are of two systems, and no point is to blame. Empty otherwise, and without positions.
+std::string common_height_text(const BlockResult& result, const Comparison& control, const Comparison& check) {
+  constexpr std::size_t kFewest = 3;
+  constexpr double kShare = 0.05, kSigmas = 3;  // of the height; of a difference
+  std::vector<WrongPoint> points = control.all;
+  points.insert(points.end(), check.all.begin(), check.all.end());
+  if (points.size() < kFewest || !positions_place(result)) return "";
+  std::vector<double> heights;
+  for (const WrongPoint& point : points) heights.push_back(point.off.z());
+  const double height = median(std::move(heights));
+  for (const WrongPoint& point : points) {
+    const Eigen::Vector3d rest = point.off - Eigen::Vector3d(0, 0, height);
+    const Eigen::Vector3d limit = (kSigmas * point.sigma).cwiseMax(kShare * std::abs(height));
+    if (!(point.sigmas > kContradictedSigmas) || (rest.array().abs() > limit.array()).any()) return "";
+  }
+  std::string text = control.all.empty() ? "" : counted(std::ssize(control.all), "control point");
+  if (!check.all.empty()) text += (text.empty() ? "" : " and ") + counted(std::ssize(check.all), "check point");
+  return fmt::format(
+      "{} lie {:.1f} m {} the block that the positions place: ellipsoidal against orthometric heights? Name a system "
+      "with a vertical part{}",
+      text, std::abs(height), height > 0 ? "below" : "above",
+      control.all.size() < 3 ? ", or give three control points, which show it before the adjustment" : "");
+}
+
 }  // namespace
 
 std::vector<std::string> wrong_control_texts(const BlockResult& result) {
   std::vector<std::string> lines;
   const Comparison control = compare_points(result, PointRole::kControl);
-  const bool tells = tells_which_is_wrong(result, control);
-  for (const std::string& text :
-       {tells ? wrong_points_text(control, PointRole::kControl, true) : contradictory_points_text(control),
-        wrong_points_text(compare_points(result, PointRole::kCheck), PointRole::kCheck, tells),
-        rejected_marks_text(result)})
+  const Comparison check = compare_points(result, PointRole::kCheck);
+  std::vector<std::string> wrong{common_height_text(result, control, check)};
+  if (wrong.front().empty()) {
+    const bool tells = tells_which_is_wrong(result, control);
+    wrong = {tells ? wrong_points_text(control, PointRole::kControl, true) : contradictory_points_text(control),
+             wrong_points_text(check, PointRole::kCheck, tells)};
+  }
+  wrong.push_back(rejected_marks_text(result));
+  for (const std::string& text : wrong)
     if (!text.empty()) lines.push_back(text);
   return lines;
 }

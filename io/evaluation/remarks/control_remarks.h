@@ -40,6 +40,8 @@ std::string unused_points_text(const BlockResult& result, PointRole role);
 // "1 of 10 control points differs from the block by more than 6 sigmas and has hardly any weight: gcp02 by 10.0 m (its
 // marks fit within 0.4 px); check its coordinates and its name", "1 mark of control and check points is rejected: gcp05
 // in IMG_0043.JPG by 312 px". Fewer than five control points, without positions that check them, are all named: "The 3
-// control points contradict each other: ...". A point of which no mark takes part is in unused_points_text.
+// control points contradict each other: ...". Where all points are off by one height, one line says so and blames none:
+// "2 control points and 4 check points lie 47.0 m below the block that the positions place: ...". A point of which no
+// mark takes part is in unused_points_text.
 std::vector<std::string> wrong_control_texts(const BlockResult& result);
 }  // namespace megablock

@@ -144,5 +144,31 @@ TEST(ControlRemarks, FewPointsThatContradictEachOtherAreAllNamed) {
   EXPECT_THAT(said().at(0), HasSubstr(" and takes no part: ")) << "the comparison without it has told";
 }
 
+// Ellipsoidal heights of the positions against orthometric ones of all points, of which two are control.
+TEST(ControlRemarks, ACommonHeightBlamesNoPoint) {
+  BlockResult result = made_up_result(small_block());
+  std::int64_t control = 0;
+  for (std::size_t p = 0; p < result.control.size(); ++p) {
+    ControlPoint& point = result.block.control_points[p];
+    point.role = control < 2 ? PointRole::kControl : PointRole::kCheck;
+    ++control;
+    point.position = result.control[p].adjusted - Eigen::Vector3d(0.1, -0.2, 47 + 0.1 * static_cast<double>(p % 3));
+    point.sigma.setConstant(0.02);
+  }
+  ASSERT_EQ(result.control.size(), 9u);
+  EXPECT_THAT(wrong_control_texts(result),
+              testing::ElementsAre("2 control points and 7 check points lie 47.1 m below the block that the positions "
+                                   "place: ellipsoidal against orthometric heights? Name a system with a vertical "
+                                   "part, or give three control points, which show it before the adjustment"));
+  BlockResult other = result;
+  other.block.control_points[4].position.z() += 10;  // it differs from the others
+  EXPECT_EQ(wrong_control_texts(other).size(), 2u);
+  other = result;
+  other.block.control_points[4].position.x() += 10;
+  EXPECT_EQ(wrong_control_texts(other).size(), 2u);
+  for (Frame& frame : result.block.frames) frame.position_prior.reset();
+  EXPECT_EQ(wrong_control_texts(result).size(), 2u);
+}
+
 }  // namespace
 }  // namespace megablock
