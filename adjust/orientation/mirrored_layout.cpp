@@ -25,9 +25,9 @@ constexpr std::size_t kFewOfLayout = 6;                        // from so many p
 constexpr std::size_t kMostPoints = 200;                       // evenly among all; more say no more
 constexpr std::size_t kMostTriples = 500, kAllSamplesOf = 15;  // points: 455 samples
 constexpr double kTimes = 5, kTimesOfFew = 10;                 // of e over e'
-constexpr double kOfSigma = 3, kLeast = 0.002, kMost = 0.02;   // of e; of e over d; of e' over d
-constexpr double kLeastInPlace = 0.1;                          // of e over d
-constexpr double kAsUpright = 0.3;                             // difference of cosines that says nothing
+constexpr double kOfSigma = 3, kLeastMirrored = 0.002, kMostMirrored = 0.02;  // of e; of e over d; of e' over d
+constexpr double kLeastInPlace = 0.1;                                         // of e over d
+constexpr double kAsUpright = 0.3;                                            // difference of cosines that says nothing
 
 Points evenly(std::span<const Eigen::Vector3d> points) {
   const std::size_t step = 1 + (points.size() - 1) / kMostPoints;
@@ -175,9 +175,10 @@ std::optional<MirroredLayout> find_mirrored_layout(std::span<const Eigen::Vector
   const Points from = evenly(model), to = evenly(given), exchanged = reflected(to, Reflection::kExchanged);
   const double size = size_of(to);
   const TrimmedFit as_given(from, to);
-  if (!(as_given.rms() > std::max(kOfSigma * sigma_m, kLeast * size))) return std::nullopt;
+  if (!(as_given.rms() > std::max(kOfSigma * sigma_m, kLeastMirrored * size))) return std::nullopt;
   const TrimmedFit mirrored(from, exchanged);
-  if (!(mirrored.rms() < kMost * size && times_of(from.size()) * mirrored.rms() < as_given.rms())) return std::nullopt;
+  if (!(mirrored.rms() < kMostMirrored * size && times_of(from.size()) * mirrored.rms() < as_given.rms()))
+    return std::nullopt;
   const double upright = uprightness(mirrored.rotation(), axes);
   if (!(upright > std::max(0.0, uprightness(as_given.rotation(), axes) - kAsUpright))) return std::nullopt;
   if (mirrored.on_a_line()) return std::nullopt;
