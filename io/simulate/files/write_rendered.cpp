@@ -203,9 +203,9 @@ std::string project_text(const SimulationOptions& options, const Block& block) {
   }
   if (!block.control_points.empty()) yaml << "control: control.csv\n";
   if (has_poses && is_stereopolis(options))
-    yaml << "poses: poses.csv  # the trajectory as start values\n"
-         << "trajectory: {file: trajectory.csv, use: [positions, attitudes]}  # the same as observations\n"
-         << (block.relative_poses.empty() ? "" : "relative_poses: relative_poses.csv  # odometer and gyroscopes\n");
+    yaml << "poses: poses.csv  # the trajectory\n"
+         << "# trajectory: {file: trajectory.csv, use: [positions, attitudes]}  # the same as observations\n"
+         << (block.relative_poses.empty() ? "" : "# relative_poses: relative_poses.csv  # odometer and gyroscopes\n");
   else if (has_poses)
     yaml << "# poses: poses.csv  # approximate poses; without them the images are oriented first\n";
   write_cameras(options, block, yaml);
