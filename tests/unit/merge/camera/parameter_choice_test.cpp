@@ -116,7 +116,7 @@ TEST(ParameterChoice, HoldsWhatPredictsImagesHardlyBetterUnlessItIsCertain) {
   Images images;
   images.groups = 40;
   images.truth[kAffinity] = 0.12;  // raises the error by 0.03 %
-  images.between = 0.2;  // the raise is two standard errors
+  images.between = 0.2;            // the raise is two standard errors
   int estimated = 0;
   for (images.seed = 1; images.seed <= 100; ++images.seed) estimated += contains(images.choose().estimated, kAffinity);
   EXPECT_LE(estimated, 20);
