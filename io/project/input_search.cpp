@@ -49,8 +49,7 @@ bool has_format(const fs::path& path, const PositionFormat& format) {
 // What a file named geo.txt is: others than OpenDroneMap use the name for tables with a header.
 std::string describe_positions(const fs::path& path) {
   try {
-    const PositionText text{path.string(), read_text_lines(path.string())};
-    if (const PositionFormat* format = recognise_positions(text)) return format->describe;
+    if (const auto* format = recognise_positions(read_position_text(path.string()))) return format->describe;
   } catch (const Error&) {
     // The reader will say what is wrong with the file.
   }

@@ -48,7 +48,12 @@ ColumnHeader column_header(const PositionText& text) {
   return header;
 }
 
-bool has_columns(const PositionText& text) { return names_rows(column_header(text).columns); }
+// A line of units under the names, "(sec) (deg) (deg) (m)", is that of inertial_text.cpp.
+bool has_columns(const PositionText& text) {
+  const ColumnHeader header = column_header(text);
+  const bool units = header.line + 1 < text.lines.size() && text.lines[header.line + 1].text.starts_with('(');
+  return names_rows(header.columns) && !units;
+}
 
 // The column that the project names for a field: a name of the header, or its number from 1.
 std::size_t column_of(const ColumnHeader& header, const std::string& field, const std::string& value,

@@ -1,5 +1,5 @@
 // SBET, the smoothed best estimate of trajectory of Applanix POSPac and of other post-processors: a binary file without
-// header, little endian, of records of 17 doubles:
+// header, of records of 17 doubles (little endian, as on all supported machines):
 //
 //     time [s of the GPS week, or of the UTC week], latitude, longitude [rad], height [m, above the ellipsoid],
 //     3 velocities [m/s], roll, pitch, platform heading, wander angle [rad], 3 accelerations, 3 angular rates
@@ -14,10 +14,8 @@
 // readers.smrmsg, for the order and the units of the fields.
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
@@ -38,15 +36,6 @@ using SbetRecord = std::array<double, kSbetFields>;
 using AccuracyRecord = std::array<double, kAccuracyFields>;
 constexpr double kSameEpoch = 1;  // s, from an epoch of the path to that of its accuracy, which is given each second
 
-double from_little_endian(double value) {
-  if constexpr (std::endian::native == std::endian::little) return value;
-  std::array<char, sizeof value> bytes{};
-  std::memcpy(bytes.data(), &value, sizeof value);
-  std::ranges::reverse(bytes);
-  std::memcpy(&value, bytes.data(), sizeof value);
-  return value;
-}
-
 template <typename Record>
 std::vector<Record> read_records(const std::string& path, const char* what) {
   const std::uintmax_t bytes = std::filesystem::file_size(path);
@@ -57,8 +46,6 @@ std::vector<Record> read_records(const std::string& path, const char* what) {
   std::vector<Record> records(bytes / sizeof(Record));
   if (!file.read(reinterpret_cast<char*>(records.data()), static_cast<std::streamsize>(bytes)))
     throw_file_error(path, "read", errno);
-  for (Record& record : records)
-    for (double& value : record) value = from_little_endian(value);
   return records;
 }
 
@@ -73,11 +60,10 @@ bool is_place(const SbetRecord& record) {
 }
 
 bool is_sbet(const PositionText& text) {
+  if (!text.binary || std::filesystem::file_size(text.path) % sizeof(SbetRecord) != 0) return false;
   SbetRecord first{};
   std::ifstream file(text.path, std::ios::binary);
-  return text.binary && std::filesystem::file_size(text.path) % sizeof(SbetRecord) == 0 &&
-         file.read(reinterpret_cast<char*>(first.data()), sizeof first) &&
-         (std::ranges::for_each(first, [](double& value) { value = from_little_endian(value); }), is_place(first));
+  return file.read(reinterpret_cast<char*>(first.data()), sizeof first) && is_place(first);
 }
 
 // Sets the sigmas of rows in the order of time from the accuracies at or next to their times.

@@ -125,13 +125,16 @@ void Trajectories::set_starts(const Eigen::Vector3d& lever_arm, Block& block) co
   const IntoGround into(block);
   if (std::ranges::any_of(sources, [](const TrajectorySource& source) { return source.relative.has_value(); }))
     block.relative_poses.clear();
+  // Times of headers and of a path have different origins; those of a block are of one clock.
+  const bool timed = poses.size() == block.frames.size() &&
+                     std::ranges::none_of(poses, [](const ObservedPose& pose) { return std::isnan(pose.time_s); });
   std::optional<RelativesOfPass> relatives;
   const ObservedPose* before = nullptr;
   for (const ObservedPose& pose : poses) {
     const TrajectorySource& source = sources[pose.source];
     Frame& frame = block.frames[pose.frame];
     if (pose.pass) frame.pass = *pose.pass;
-    if (!std::isnan(pose.time_s)) frame.time_s = pose.time_s;
+    if (timed) frame.time_s = pose.time_s;
     if (!pose.rotation) continue;
     const Eigen::Quaterniond rotation = into.rotation(pose);
     const Pose rig{rotation, into.position(pose) - rotation.conjugate() * source.lever_arm.value_or(lever_arm)};

@@ -69,8 +69,8 @@ class Trajectories {
   void set_positions(const std::optional<double>& sigma_horizontal, const std::optional<double>& sigma_vertical,
                      const Eigen::Vector3d& lever_arm, Block& block) const;
   void set_attitudes(const std::optional<double>& sigma_deg, Block& block) const;
-  // Sets start values, passes, times and relative poses. The block's own relative poses give way to those.
-  // `lever_arm`: where a source has none.
+  // Sets start values, passes, times (where all frames have one) and relative poses. The block's own relative poses
+  // give way to those. `lever_arm`: where a source has none.
   void set_starts(const Eigen::Vector3d& lever_arm, Block& block) const;
 };
 

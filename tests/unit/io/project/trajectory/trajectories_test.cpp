@@ -73,6 +73,15 @@ TEST_F(TrajectoriesTest, StartWhereTheLeverArmPutsTheRig) {
   EXPECT_TRUE(block_.relative_poses.empty());
 }
 
+// A frame without a pose has the time of its header, of another clock.
+TEST_F(TrajectoriesTest, TakeTimesOnlyWhereAllFramesHaveOne) {
+  const double before = block_.frames[FrameIndex(2)].time_s = 1e9;
+  trajectories_.poses.pop_back();
+  trajectories_.set_starts(Eigen::Vector3d::Zero(), block_);
+  EXPECT_EQ(frame(2).time_s, before);
+  EXPECT_EQ(frame(2).pass, 7);
+}
+
 // White noise of each pose and a random walk between: over 3 m and 2 s.
 TEST_F(TrajectoriesTest, RelativePosesHaveTheSigmasOfTheDrift) {
   source().relative = DriftModel{0.005, 0.002, 0.01, 0.02, 50, 60};
