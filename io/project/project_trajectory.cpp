@@ -24,7 +24,7 @@ namespace {
 using Row = PositionTable::Row;
 
 // Where neither the file nor the project states sigmas: those of images (project_priors.cpp).
-constexpr Limits kGap{1e-3, 1e6};  // metres, seconds
+constexpr Limits kGapLimits{1e-3, 1e6};  // metres, seconds
 constexpr double kHorizontalM = 3, kVerticalM = 6, kTiltDeg = 3, kHeadingDeg = 10;
 
 AngleKind looking_direction(const std::string& text, const std::string& where) {
@@ -59,8 +59,8 @@ DriftModel read_drift(YamlReader reader) {
   set("sigma_position_m_per_sqrt_m", model.sigma_position_per_sqrt_m, kSigmaMetres);
   set("sigma_rotation_deg", model.sigma_rotation_deg, kSigmaDegrees);
   set("sigma_rotation_deg_per_sqrt_s", model.sigma_rotation_deg_per_sqrt_s, kSigmaDegrees);
-  model.max_gap_m = reader.number("max_gap_m", kGap).value_or(model.max_gap_m);
-  model.max_gap_s = reader.number("max_gap_s", kGap).value_or(model.max_gap_s);
+  model.max_gap_m = reader.number("max_gap_m", kGapLimits).value_or(model.max_gap_m);
+  model.max_gap_s = reader.number("max_gap_s", kGapLimits).value_or(model.max_gap_s);
   if (model.sigma_position_m == 0 || model.sigma_rotation_deg == 0)
     throw InputError(reader.where() + ": relative: sigma_position_m and sigma_rotation_deg must be more than 0");
   reader.finish();
